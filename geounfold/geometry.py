@@ -1,0 +1,99 @@
+"""Lengths, areas, volumes, normals and edges, on plain arrays.
+
+Signs are kept: a volume or an area is negative where an element is turned inside out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geounfold.mesh import Floats, Ints
+
+
+def unique_edges(F: Ints) -> Ints:
+    """Return the undirected edges of triangles, (k, 2), lower index first, sorted.
+
+    >>> unique_edges(np.array([[0, 1, 2], [2, 1, 3]])).tolist()
+    [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]
+    """
+    E = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
+    key = E[:, 0] * (int(F.max(initial=0)) + 1) + E[:, 1]
+    first = np.unique(key, return_index=True)[1]
+    return np.ascontiguousarray(E[first])
+
+
+def lengths(V: Floats, E: Ints) -> Floats:
+    """Return the length of each edge, (k,), in the vertices' unit."""
+    out: Floats = np.linalg.norm(V[E[:, 1]] - V[E[:, 0]], axis=1)
+    return out
+
+
+def cross2(a: Floats, b: Floats) -> Floats:
+    """Return the z of the cross product of (…, 2) vectors; positive counter-clockwise."""
+    out: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out
+
+
+def triangle_areas(V: Floats, F: Ints) -> Floats:
+    """Return the area of each triangle, (m,): signed in 2-D (counter-clockwise positive).
+
+    >>> flat = np.array([[0.0, 0], [1, 0], [0, 1]])
+    >>> triangle_areas(flat, np.array([[0, 1, 2], [0, 2, 1]])).tolist()
+    [0.5, -0.5]
+    """
+    a, b = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    if V.shape[1] == 2:
+        return cross2(a, b) / 2
+    out: Floats = np.linalg.norm(np.cross(a, b), axis=1) / 2
+    return out
+
+
+def face_normals(V: Floats, F: Ints) -> Floats:
+    """Return the unit normal of each triangle, (m, 3); zero for a degenerate one."""
+    N = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+    length = np.linalg.norm(N, axis=1, keepdims=True)
+    out: Floats = np.divide(N, length, out=np.zeros_like(N), where=length > 0)
+    return out
+
+
+def vertex_sum(values: Floats, F: Ints, n: int) -> Floats:
+    """Return the sum over each vertex's faces of a value per face, (n,) or (n, d)."""
+    index = F.ravel()
+    if values.ndim == 1:
+        return np.bincount(index, np.repeat(values, F.shape[1]), n)
+    columns = [np.bincount(index, np.repeat(column, F.shape[1]), n) for column in values.T]
+    return np.stack(columns, axis=1)
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return vectors (n, d) scaled to length one; a zero vector stays zero."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    out: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+    return out
+
+
+def vertex_normals(V: Floats, F: Ints) -> Floats:
+    """Return area-weighted unit normals at the vertices, (n, 3)."""
+    N = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+    return unit(vertex_sum(N, F, len(V)))
+
+
+def enclosed_volume(V: Floats, F: Ints) -> float:
+    """Return the signed volume inside a closed surface; positive when normals point outwards."""
+    C = V - V.mean(axis=0)
+    a, b, c = C[F[:, 0]], C[F[:, 1]], C[F[:, 2]]
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+def tet_volumes(V: Floats, T: Ints) -> Floats:
+    """Return the signed volume of each tetrahedron, (m,); negative where inverted.
+
+    >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> [round(v * 6, 12) for v in tet_volumes(corner, np.array([[0, 1, 2, 3], [1, 0, 2, 3]]))]
+    [1.0, -1.0]
+    """
+    a = V[T[:, 0]]
+    out: Floats = (
+        np.einsum("ij,ij->i", V[T[:, 1]] - a, np.cross(V[T[:, 2]] - a, V[T[:, 3]] - a)) / 6
+    )
+    return out

@@ -1,0 +1,43 @@
+"""What every hull method returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geounfold.mesh import TriMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Hull:
+    """A closed, outward-oriented, manifold surface around the blocks, in working units.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        One component, genus as the body's; edges of about 1.5 working units.
+    method : str
+        The method that made it: alpha, ball_pivoting, poisson or density.
+    volume : float
+        Enclosed volume, working units cubed (a block has volume 1 on a lattice).
+    blocks_volume : float
+        Volume of the blocks: their count, as one block is one cubic working unit.
+    inset : float
+        How far inside the blocks' own outer faces the surface runs, in working units:
+        0.5 where it passes through the outermost centroids, 0 where it encloses the blocks.
+    blur : float
+        Standard deviation (working units per unit of block side) of the Gaussian blur the
+        surface was made with; its curvature bias is undone later.  0 where there was none.
+    dropped : int
+        Faces of cavities and specks that were left out.
+    reason : str
+        Why this method was chosen, when the choice was automatic; else empty.
+    """
+
+    mesh: TriMesh
+    method: str
+    volume: float
+    blocks_volume: float
+    inset: float
+    blur: float
+    dropped: int = 0
+    reason: str = ""

@@ -1,0 +1,111 @@
+"""Triangle and tetrahedral meshes: frozen, checked, never reordered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geounfold.errors import MeshError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+def _checked(
+    vertices: Floats, cells: Ints, corners: int, kind: str, dims: tuple[int, ...]
+) -> tuple[Floats, Ints]:
+    """Read-only copies of a mesh's arrays, or MeshError saying what is wrong."""
+    V = np.array(vertices, dtype=np.float64, order="C")
+    C = np.array(cells, dtype=np.int64, order="C")
+    if V.ndim != 2 or V.shape[1] not in dims:
+        allowed = " or ".join(f"(n, {d})" for d in dims)
+        raise MeshError(f"vertices must have shape {allowed}, but have {V.shape}")
+    if C.ndim != 2 or C.shape[1] != corners:
+        raise MeshError(f"{kind} must have shape (m, {corners}), but have {C.shape}")
+    if not np.isfinite(V).all():
+        bad = int(np.flatnonzero(~np.isfinite(V).all(axis=1))[0])
+        raise MeshError(f"vertex {bad} is not finite: {V[bad]}")
+    if C.size and not 0 <= C.min() <= C.max() < len(V):
+        raise MeshError(f"{kind} index {C.min()}..{C.max()}, but there are {len(V)} vertices")
+    V.flags.writeable = False
+    C.flags.writeable = False
+    return V, C
+
+
+@dataclass(frozen=True, eq=False)
+class TriMesh:
+    """A triangulated surface.
+
+    Parameters
+    ----------
+    V : (n, 3) or (n, 2) float
+        Vertices, in any length unit.
+    F : (m, 3) int
+        Faces; counter-clockwise seen from the side their normal points to.
+
+    Raises
+    ------
+    MeshError
+        Wrong shapes, indices out of range, or vertices that are not finite.
+
+    Examples
+    --------
+    >>> mesh = TriMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> len(mesh.V), len(mesh.F)
+    (3, 1)
+    """
+
+    V: Floats
+    F: Ints
+
+    def __post_init__(self) -> None:
+        V, F = _checked(self.V, self.F, 3, "faces", (2, 3))
+        object.__setattr__(self, "V", V)
+        object.__setattr__(self, "F", F)
+
+    def with_vertices(self, vertices: Floats) -> TriMesh:
+        """Return the same faces over other vertices, (n, 3) or (n, 2)."""
+        return TriMesh(vertices, self.F)
+
+    def submesh(self, faces: Bools | Ints) -> tuple[TriMesh, Ints]:
+        """Return the mesh of some faces without unused vertices, and its vertices' old indices."""
+        old, F = np.unique(self.F[faces], return_inverse=True)
+        return TriMesh(self.V[old], F.reshape(-1, 3)), old
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """A tetrahedral mesh.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices, in any length unit.
+    T : (m, 4) int
+        Tetrahedra; right-handed (positive volume) where not inverted.
+
+    Raises
+    ------
+    MeshError
+        Wrong shapes, indices out of range, or vertices that are not finite.
+    """
+
+    V: Floats
+    T: Ints
+
+    def __post_init__(self) -> None:
+        V, T = _checked(self.V, self.T, 4, "tetrahedra", (3,))
+        object.__setattr__(self, "V", V)
+        object.__setattr__(self, "T", T)
+
+    def with_vertices(self, vertices: Floats) -> TetMesh:
+        """Return the same tetrahedra over other vertices, (n, 3)."""
+        return TetMesh(vertices, self.T)
+
+
+def as_trimesh(mesh: TriMesh | tuple[Floats, Ints]) -> TriMesh:
+    """Return a TriMesh from a TriMesh or a (V, F) pair."""
+    return mesh if isinstance(mesh, TriMesh) else TriMesh(*mesh)

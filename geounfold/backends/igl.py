@@ -1,0 +1,137 @@
+"""libigl: adjacency, ray casts, closest points, point location, barycentric coordinates."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from geounfold.mesh import Bools, Floats, Ints
+
+
+def _f(a: Floats) -> Floats:
+    return np.ascontiguousarray(a, dtype=np.float64)
+
+
+def _i(a: Ints) -> Ints:
+    return np.ascontiguousarray(a, dtype=np.int64)
+
+
+class SurfaceIndex:
+    """A tree over triangles, built once, for closest points and ray casts.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices.
+    F : (m, 3) int
+        Triangles.
+    """
+
+    def __init__(self, V: Floats, F: Ints) -> None:
+        self.V, self.F = _f(V), _i(F)
+        self._tree = igl.AABB()
+        self._tree.init(self.V, self.F)
+
+    def closest(self, Q: Floats) -> tuple[Floats, Ints, Floats]:
+        """Return distance (k,), face (k,) and closest point (k, 3) for each query point."""
+        d2, face, point = self._tree.squared_distance(self.V, self.F, _f(Q))
+        return np.sqrt(d2), np.asarray(face, dtype=np.int64), point
+
+    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:
+        """Return the first face met by each ray (-1 for none) and the distance (inf for none)."""
+        face, distance, _ = self._tree.intersect_ray_first(
+            self.V, self.F, _f(origins), _f(directions)
+        )
+        face = np.asarray(face, dtype=np.int64)
+        missed = (face < 0) | ~np.isfinite(distance)
+        return np.where(missed, -1, face), np.where(missed, np.inf, distance)
+
+
+class TetIndex:
+    """A tree over tetrahedra, built once, for point location.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices.
+    T : (m, 4) int
+        Right-handed tetrahedra.
+    """
+
+    def __init__(self, V: Floats, T: Ints) -> None:
+        self.V, self.T = _f(V), _i(T)
+        self._tree = igl.AABB()
+        self._tree.init(self.V, self.T)
+
+    def locate(self, Q: Floats) -> Ints:
+        """Return the tetrahedron holding each query point, (k,); -1 outside all."""
+        return np.asarray(igl.in_element(self.V, self.T, _f(Q), self._tree), dtype=np.int64)
+
+    def barycentric(self, Q: Floats, element: Ints) -> Floats:
+        """Return the barycentric coordinates of each point in its tetrahedron, (k, 4)."""
+        corners = [_f(self.V[self.T[element, k]]) for k in range(4)]
+        return np.asarray(igl.barycentric_coordinates(_f(Q), *corners))
+
+
+def barycentric_in_triangles(Q: Floats, V: Floats, F: Ints) -> Floats:
+    """Return barycentric coordinates (k, 3) of points Q, each in its own triangle F (k, 3)."""
+    corners = [_f(V[F[:, k]]) for k in range(3)]
+    return np.asarray(igl.barycentric_coordinates(_f(Q), *corners))
+
+
+def triangle_adjacency(F: Ints) -> Ints:
+    """Return the neighbour across each edge of each triangle, (m, 3); -1 at the boundary."""
+    return np.asarray(igl.triangle_triangle_adjacency(_i(F))[0], dtype=np.int64)
+
+
+def face_components(F: Ints) -> Ints:
+    """Return the connected component (across edges) of each triangle, (m,)."""
+    result = igl.facet_components(_i(F))
+    component = result[1] if isinstance(result, tuple) and np.ndim(result[1]) else result
+    component = component[0] if isinstance(component, tuple) else component
+    return np.asarray(component, dtype=np.int64).ravel()
+
+
+def boundary_loops(F: Ints) -> list[Ints]:
+    """Return the boundary loops of a triangle mesh, longest (most vertices) first."""
+    loops = [np.asarray(loop, dtype=np.int64) for loop in igl.boundary_loop_all(_i(F))]
+    return sorted(loops, key=len, reverse=True)
+
+
+def is_manifold(F: Ints) -> bool:
+    """Return True where every edge has at most two faces and every vertex one fan of faces."""
+    edge = igl.is_edge_manifold(_i(F))
+    edge_ok = bool(np.all(edge[0] if isinstance(edge, tuple) else edge))
+    vertex = igl.is_vertex_manifold(_i(F))
+    return edge_ok and bool(np.all(vertex[0] if isinstance(vertex, tuple) else vertex))
+
+
+def marching_cubes(field: Floats, origin: Floats, step: Floats, level: float) -> tuple[Floats, Ints]:
+    """Return the level surface of a regular grid as (V, F), outward where the field falls.
+
+    Parameters
+    ----------
+    field : (nx, ny, nz) float
+        Values at the grid's nodes; below ``level`` on the grid's border.
+    origin, step : (3,) float
+        Position of node (0, 0, 0) and node spacing per axis.
+    level : float
+        Value on the surface.
+    """
+    nx, ny, nz = field.shape
+    axes = [origin[k] + step[k] * np.arange(n) for k, n in enumerate(field.shape)]
+    grid = np.empty((nz, ny, nx, 3))
+    grid[..., 0] = axes[0]
+    grid[..., 1] = axes[1][:, None]
+    grid[..., 2] = axes[2][:, None, None]
+    values = np.ascontiguousarray(field.transpose(2, 1, 0)).ravel().astype(np.float64)
+    V, F = igl.marching_cubes(values, grid.reshape(-1, 3), nx, ny, nz, level)[:2]
+    return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
+
+
+def border_vertices(F: Ints, n: int) -> Bools:
+    """Return which of n vertices lie on the mesh's border, (n,)."""
+    out = np.zeros(n, dtype=bool)
+    for loop in boundary_loops(F):
+        out[loop] = True
+    return out

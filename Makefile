@@ -1,0 +1,70 @@
+# `make help` lists the targets. Each makes the environment in .venv first, when it is missing
+# or older than pyproject.toml or constraints.txt. Needs Python >= 3.11 with pip, and the
+# system libraries that README.md names.
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help env demo test test-all check format bench notebooks accept clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.stamp
+EXTRAS := dev,notebooks,parquet,view
+ACCEPTANCE ?= ../shared/acceptance
+PYTEST_ARGS ?=
+
+help:  ## list the targets
+	@grep -E '^[a-z-]+:.*  ## ' $(MAKEFILE_LIST) | awk -F ':.*  ## ' '{printf "%-12s%s\n", $$1, $$2}'
+
+env: $(STAMP)  ## make or renew the environment in .venv
+
+# Some systems ship Python without ensurepip: pip then installs itself from outside.
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "geounfold needs Python 3.11 or later: make PYTHON=python3.12 ..." >&2; exit 2; }
+	@[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || \
+	    $(PYTHON) -m venv --clear --without-pip $(VENV)
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || \
+	    $(PYTHON) -m pip --python $(BIN)/python install --quiet pip
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --constraint constraints.txt --editable '.[$(EXTRAS)]'
+	@touch $@
+
+demo: $(STAMP)  ## simulate a folded body, unfold it, write a report and say where
+	@mkdir -p demo
+	$(BIN)/geounfold simulate sim_case_1 -o demo/sim_case_1.csv --overwrite
+	$(BIN)/geounfold unfold demo/sim_case_1.csv -o demo/unfolded.csv \
+	    --summary demo/summary.json --map demo/map.npz --report demo/report.html --overwrite
+	@echo "Report: $(CURDIR)/demo/report.html"
+
+test: $(STAMP)  ## run the tests and the docstrings' examples
+	$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGS)
+
+test-all: $(STAMP)  ## the same with the slow tests
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+check: $(STAMP)  ## formatting, lint, types and the direction of imports
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(STAMP)  ## put the code into the standard format
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(STAMP)  ## time the stages
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-only $(PYTEST_ARGS)
+
+notebooks: $(STAMP)  ## bring scripts and notebooks together, then run each notebook whole
+	$(BIN)/jupytext --sync notebooks/*.py
+	$(BIN)/python -m pytest --nbmake notebooks $(PYTEST_ARGS)
+
+accept: $(STAMP)  ## score the acceptance bodies, where they are present
+	@if [ -f $(ACCEPTANCE)/score.py ]; then $(BIN)/python $(ACCEPTANCE)/score.py; \
+	else echo "no acceptance bodies at $(ACCEPTANCE): nothing scored"; fi
+
+clean:  ## remove the environment, caches and outputs
+	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	    .import_linter_cache .benchmarks
+	find geounfold tests -name __pycache__ -type d -prune -exec rm -rf {} +

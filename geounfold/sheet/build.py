@@ -1,0 +1,229 @@
+"""The control mesh of a fitted sheet: footprint, flattening, offsets, repair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geounfold.backends.igl import TetIndex
+from geounfold.control import ControlMesh
+from geounfold.geometry import lengths, unique_edges
+from geounfold.mesh import Bools, Floats, Ints, TetMesh, TriMesh
+from geounfold.sheet.fit import FittedSheet
+from geounfold.sheet.footprint import Footprint, footprint, principal_direction
+from geounfold.sheet.horizons import Horizons
+from geounfold.sheet.layers import FRACTIONS, Layers, bad_nodes, neighbour_mean, shrink
+from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
+
+Flatten = Callable[[TriMesh, Floats | None, Floats | None], Floats]
+"""``flatten(mesh, start, rest)`` -> uv (n, 2); ``rest`` are lengths of ``unique_edges(F)``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlOptions:
+    """Shape of the control mesh; lengths in blocks.
+
+    ``cell``: side of the footprint's cells; ``dilation``: rings of cells past the blocks;
+    ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
+    where they vary; ``focal``: largest share of the focal distance; ``reach``: radius, in
+    cells, of the filter on varying offsets; ``shrinks``: most steps of the repair;
+    ``trip``: largest round-trip error of a block.
+    """
+
+    cell: float = 1.5
+    dilation: int = 1
+    pad: float = 0.6
+    pad_capped: float = 1.0
+    focal: float = 0.9
+    reach: int = 3
+    shrinks: int = 40
+    trip: float = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SheetMesh:
+    """What the sheet method made of a body, in working units.
+
+    Attributes
+    ----------
+    control : ControlMesh
+        Tetrahedra in both spaces.
+    mid : TriMesh
+        The folded mid surface over the footprint.
+    mid_flat : (n, 2) float
+        The same vertices laid flat.
+    heights : (2, n) float
+        Bottom's and top's signed offset at those vertices.
+    layers : Layers
+        The prisms.
+    rung : str
+        Last rung of the ladder that was needed: constant, capped or shrunk.
+    shrinks : int
+        Steps of the shrinking rung.
+    """
+
+    control: ControlMesh
+    mid: TriMesh
+    mid_flat: Floats
+    heights: Floats
+    layers: Layers
+    rung: str
+    shrinks: int
+
+
+def arc_lengths(V: Floats, normal: Floats, F: Ints) -> Floats:
+    """Return the lengths of the edges measured along arcs that meet the normals, (k,).
+
+    A chord under an arc of half-angle a is sin(a)/a of it; 2 a is the angle between the
+    normals (n, 3) at its ends.
+    """
+    E = unique_edges(F)
+    half = np.arcsin(np.clip(np.linalg.norm(normal[E[:, 0]] - normal[E[:, 1]], axis=1) / 2, 0, 1))
+    stretch = np.divide(half, np.sin(half), out=np.ones_like(half), where=half > 1e-9)
+    return lengths(V, E) * stretch
+
+
+def register(A: Floats, B: Floats, weight: Floats) -> Floats:
+    """Return A (n, 2) moved rigidly, never mirrored, onto B (n, 2) by weighted least squares."""
+    w = weight / weight.sum()
+    a, b = w @ A, w @ B
+    u, _, vt = np.linalg.svd(((A - a) * w[:, None]).T @ (B - b))
+    d = np.sign(np.linalg.det(u @ vt))
+    out: Floats = (A - a) @ (u @ np.diag([1.0, d]) @ vt) + b
+    return out
+
+
+def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
+    """Return the feet of all blocks; those past the trimmed sheet are searched on all of it."""
+    foot = fitted.sheet.search(fitted.near, reach).feet(points)
+    missed = foot.miss > 0.05
+    if missed.any():
+        again = fitted.sheet.search().feet(points[missed], newton=3)
+        for mine, theirs in zip(foot, again, strict=True):
+            mine[missed] = theirs
+    return foot
+
+
+def _flat_layers(
+    sheet: Sheet, prints: Footprint, c: tuple[float, float], flatten: Flatten
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return P, normals, flat mid and the slopes above and below, all at the nodes."""
+    jet = sheet.jet(prints.U)
+    P, normal = jet.value, normals(jet)
+
+    def flat(V: Floats, start: Floats) -> Floats:
+        return flatten(TriMesh(V, prints.F), start, arc_lengths(V, normal, prints.F))
+
+    mid = flat(P, prints.U)
+    mid = register(mid, prints.U, prints.weight)
+    slopes = [
+        (register(flat(P + s * q * normal, mid), mid, prints.weight) - mid) / q
+        for s, q in zip((1.0, -1.0), c, strict=True)
+    ]
+    return P, normal, mid, slopes[0], slopes[1]
+
+
+def _focal_caps(curvature: Floats, focal: float) -> Floats:
+    return np.asarray(focal / np.maximum(curvature, 1e-9))
+
+
+def _offsets(prints: Footprint, foot: Foot, caps: Floats, options: ControlOptions) -> Floats:
+    """Return offsets (2, n) that follow the blocks, capped at a share of the focal distance."""
+    use = foot.miss < 0.5
+    need = [prints.cell_max(s * foot.t, use) for s in (1.0, -1.0)]
+    follow = [prints.at_nodes(q, options.reach) + options.pad_capped for q in need]
+    return np.minimum(np.stack(follow), caps)
+
+
+def _round_trip_misses(layers: Layers, T: Ints, points: Floats, limit: float) -> Ints:
+    """Return the footprint nodes of tetrahedra holding blocks that do not come back."""
+    folded, unfolded = layers.folded, layers.unfolded
+    there, back = TetIndex(folded, T), TetIndex(unfolded, T)
+    first = there.locate(points)
+    inside = first >= 0
+    b = there.barycentric(points[inside], first[inside])
+    flat = np.einsum("ij,ijk->ik", b, unfolded[T[first[inside]]])
+    second = back.locate(flat)
+    other = np.where(second >= 0, second, first[inside])
+    returned = np.einsum("ij,ijk->ik", back.barycentric(flat, other), folded[T[other]])
+    missed = np.abs(returned - points[inside]).max(axis=1) > limit
+    return np.unique(T[np.concatenate([first[inside][missed], other[missed]])] % len(layers.P))
+
+
+def _climb(
+    layers: Layers, follow: Floats, constant: bool, points: Floats, options: ControlOptions
+) -> tuple[Layers, str, int]:
+    """Return layers that are upright in both spaces and bring every block back.
+
+    Rungs: constant offsets (parallel surfaces), offsets that follow the blocks under the
+    focal cap, then shrinking around what is still wrong.
+    """
+    T = layers.tets()
+    mean = neighbour_mean(layers.F, len(layers.P))
+    rung = "constant" if constant else "capped"
+    for shrinks in range(options.shrinks + 1):
+        nodes = bad_nodes(layers, T)
+        if not len(nodes):
+            nodes = _round_trip_misses(layers, T, points, options.trip)
+        if not len(nodes) or shrinks == options.shrinks:
+            break
+        if rung == "constant":
+            rung, layers = "capped", replace(layers, up=follow[0], down=follow[1])
+            continue
+        rung, layers = "shrunk", shrink(layers, nodes, mean)
+    return layers, rung, shrinks
+
+
+def build_control(
+    fitted: FittedSheet,
+    horizons: Horizons,
+    points: Floats,
+    flatten: Flatten,
+    options: ControlOptions,
+) -> SheetMesh:
+    """Return the control mesh that holds the blocks, in both spaces (see SheetMesh).
+
+    Prism edges are normals of the mid surface; surfaces parallel to it above and below are
+    flattened on their own and registered rigidly to the flat mid surface, which reproduces
+    flexural slip with zero mean slip (the pin line).
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Mid surface.
+    horizons : Horizons
+        Top and bottom, for the stratigraphic coordinate.
+    points : (n, 3) float
+        Blocks, working units.
+    flatten : callable
+        See Flatten.
+    options : ControlOptions
+        See there.
+    """
+    sheet = fitted.sheet
+    foot = block_feet(fitted, points, reach=10.0)
+    prints = footprint(foot.U, principal_direction(sheet, foot.U), options.cell, options.dilation)
+    k1, k2 = principal_curvatures(sheet.jet(prints.U))
+    curvature = np.stack([k1, -k2])
+    caps = _focal_caps(curvature, options.focal)
+    use = foot.miss < 0.5
+    reach = float(np.abs(foot.t[use]).max()) + options.pad
+    constant = not (caps < reach).any()
+    safe = [reach if constant else min(reach, float(np.percentile(c, 0.5))) for c in caps]
+    P, normal, flat, above, below = _flat_layers(sheet, prints, (safe[0], safe[1]), flatten)
+    follow = _offsets(prints, foot, caps, options)
+    offsets = np.full_like(follow, reach) if constant else follow
+    layers = Layers(P, normal, flat, above, below, prints.F, curvature, offsets[0], offsets[1])
+    layers, rung, shrinks = _climb(layers, follow, constant, points, options)
+    bottom, top = horizons.heights(prints.U)
+    control = _control(layers, bottom, top)
+    mid = TriMesh(P, prints.F)
+    return SheetMesh(control, mid, flat, np.stack([bottom, top]), layers, rung, shrinks)
+
+
+def _control(layers: Layers, bottom: Floats, top: Floats) -> ControlMesh:
+    T = layers.tets()
+    stratigraphic = np.concatenate([(q - bottom) / (top - bottom) for q in layers.heights])
+    return ControlMesh(TetMesh(layers.folded, T), TetMesh(layers.unfolded, T), stratigraphic)

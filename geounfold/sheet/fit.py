@@ -1,0 +1,251 @@
+"""Fit the mid surface and the half thickness, growing from the core to the rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from geounfold.geometry import unit
+from geounfold.mesh import Bools, Floats
+from geounfold.sheet.medial import MedialSheet
+from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
+from geounfold.sheet.surface import Foot, Sheet, blur_shift, near_any, slip_potential
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """Resolution, smoothness and acceptance of the sheet fit; lengths in blocks.
+
+    ``knots``: spline knot spacing; ``cell``: spacing of the searched sampling; ``smooth``:
+    length below which the mid surface is smoothed, on smooth hulls and (times ``rough``)
+    on staircases, by residuals between ``quiet`` and ``loud``; ``smooth_half``: the same for
+    the half thickness; ``weak``: weight of medial points off the core; ``rounds``: growth
+    rounds; ``agree``: least cosine between a sample's normal and the predicted one;
+    ``first``/``later``: largest thickness misfit of an accepted sample in round one and
+    after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
+    accepted samples the sheet is searched.
+    """
+
+    knots: float = 3.5
+    cell: float = 1.5
+    smooth: float = 2.2
+    rough: float = 1.5
+    quiet: float = 0.03
+    loud: float = 0.08
+    smooth_half: float = 3.0
+    weak: float = 1e-4
+    rounds: int = 4
+    agree: float = 0.92
+    first: float = 1.5
+    later: float = 1.0
+    erosion: float = 1.5
+    reach: float = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points of the hull with outward normals, and how the hull was made.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) float
+        Hull vertices, working units, and their unit outward normals.
+    variance : (3,) float
+        Variance of the blur per axis.
+    inset : float
+        How far inside the body's surface the hull runs.
+    """
+
+    points: Floats
+    normals: Floats
+    variance: Floats
+    inset: float
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSheet:
+    """The fitted mid surface with its half thickness.
+
+    Attributes
+    ----------
+    sheet : Sheet
+        Mid surface; offsets are positive on the top's side.
+    half : (size,) float
+        Spline coefficients of the half thickness, in *unfolded* parameters.
+    slip : (size, 2) float
+        Spline coefficients of the slip potential: unfolded u = U - t slip(U).
+    near : (k, 2) float
+        Parameters of the accepted samples.
+    roughness : float
+        Weighted rms residual of the accepted samples, in blocks.
+    smoothing : float
+        Smoothing length used, in blocks.
+    accepted : float
+        Share of the samples accepted.
+    """
+
+    sheet: Sheet
+    half: Floats
+    slip: Floats
+    near: Floats
+    roughness: float
+    smoothing: float
+    accepted: float
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """The grid's energies and weights that every solve of the fit shares."""
+
+    grid: SplineGrid
+    bending: sp.csc_array
+    third: sp.csc_array
+    half_weight: float
+
+    def surface_weight(self, length: float) -> float:
+        return (length / self.grid.step) ** 6
+
+    @property
+    def ridge(self) -> sp.sparray:
+        return 1e-9 * sp.eye_array(self.grid.size)
+
+
+def _start(
+    medial: MedialSheet, points: Floats, options: FitOptions
+) -> tuple[_System, Sheet, Floats]:
+    """Return the spline system, the first sheet and the first half thickness."""
+    margin = cKDTree(medial.mesh.V).query(points)[0].max() + 3
+    low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
+    grid = SplineGrid.over(low, high, options.knots)
+    half_weight = (options.smooth_half / options.knots) ** 4
+    system = _System(grid, grid.energy(2), grid.energy(3), half_weight)
+    w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
+    B = grid.basis(medial.uv)
+    BtWB = B.T @ sp.diags_array(w) @ B + system.ridge
+    C = spd_solver(BtWB + system.surface_weight(options.smooth) * system.third)(
+        B.T @ (w[:, None] * medial.mesh.V)
+    )
+    half = spd_solver(BtWB + half_weight * system.bending)(B.T @ (w * medial.half))
+    return system, Sheet(grid, C, low, high, options.cell), half
+
+
+@dataclass(frozen=True, eq=False)
+class _Accepted:
+    """Samples accepted in one round of growth."""
+
+    foot: Foot
+    height: Floats  # offset with the hull's bias undone
+    side: Floats
+    flat: Floats  # unfolded parameters
+    keep: Bools
+
+
+def unbiased_heights(sheet: Sheet, foot: Foot, side: Floats, samples: Samples) -> Floats:
+    """Return the samples' offsets with the hull's blur and inset undone, (n,)."""
+    shift = np.zeros(len(foot.t))
+    if samples.variance.any():
+        shift = np.clip(blur_shift(sheet.jet(foot.U), foot.t, samples.variance), -0.5, 0.5)
+    return foot.t - shift + side * samples.inset
+
+
+def _accept(
+    sheet: Sheet,
+    half: Floats,
+    slip: Floats | None,
+    foot: Foot,
+    samples: Samples,
+    misfit: float,
+    options: FitOptions,
+) -> _Accepted:
+    """Return which samples agree with the sheet so far, by normal and by thickness."""
+    side = np.sign(np.einsum("ij,ij->i", samples.normals, foot.normal))
+    height = unbiased_heights(sheet, foot, side, samples)
+    flat = foot.U if slip is None else foot.U - foot.t[:, None] * sheet.grid.value(slip, foot.U)
+    expected, hu, hv = sheet.grid.gradient(half, flat)
+    _, Pu, Pv = sheet.grid.gradient(sheet.C, foot.U)
+    predicted = unit(side[:, None] * foot.normal - hu[:, None] * Pu - hv[:, None] * Pv)
+    cos = np.einsum("ij,ij->i", samples.normals, predicted)
+    good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
+    true_foot = foot.miss < 0.1
+    rejected = near_any(samples.points, ~good & true_foot, options.erosion)
+    return _Accepted(foot, height, side, flat, good & true_foot & ~rejected)
+
+
+def _side_weights(accepted: _Accepted, cell: float) -> Floats:
+    """Return weights that count every knot cell once per side."""
+    U, side = accepted.foot.U[accepted.keep], accepted.side[accepted.keep]
+    w = np.empty(len(U))
+    for s in (1.0, -1.0):
+        mine = side == s
+        if mine.any():
+            w[mine] = density_weights(U[mine], cell)
+    return w
+
+
+def _refit(
+    system: _System, sheet: Sheet, accepted: _Accepted, smoothing: float, options: FitOptions
+) -> tuple[Sheet, Floats, Floats, float, float]:
+    """Return sheet, half thickness, weights, roughness and smoothing of one round.
+
+    Offset and half thickness are solved together, t = delta(U) + side half(u); the mid
+    points move by what is left and the surface is fitted to them anew.
+    """
+    keep = accepted.keep
+    U, t, s = accepted.foot.U[keep], accepted.height[keep], accepted.side[keep]
+    w = _side_weights(accepted, options.knots)
+    B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
+    W, Ws = sp.diags_array(w), sp.diags_array(w * s)
+    BtWB = B.T @ W @ B + system.ridge
+    K = sp.block_array(
+        [
+            [BtWB + system.surface_weight(smoothing) * system.third, B.T @ Ws @ H],
+            [H.T @ Ws @ B, H.T @ W @ H + system.half_weight * system.bending + system.ridge],
+        ]
+    )
+    z = spd_solver(K)(np.concatenate([B.T @ (w * t), H.T @ (w * s * t)]))
+    half = z[system.grid.size :]
+    mid = t - s * (H @ half)
+    residual = mid - B @ z[: system.grid.size]
+    roughness = float(np.sqrt((w * residual**2).sum() / w.sum()))
+    stretch = np.interp(roughness, [options.quiet, options.loud], [1.0, options.rough])
+    smoothing = options.smooth * float(stretch)
+    points = sheet.at(U) + mid[:, None] * accepted.foot.normal[keep]
+    C = spd_solver(BtWB + system.surface_weight(smoothing) * system.third)(
+        B.T @ (w[:, None] * points)
+    )
+    return sheet.with_coefficients(C), half, w, roughness, smoothing
+
+
+def fit_sheet(
+    medial: MedialSheet, samples: Samples, points: Floats, options: FitOptions
+) -> FittedSheet:
+    """Return the mid surface and half thickness fitted to a hull.
+
+    Parameters
+    ----------
+    medial : MedialSheet
+        First guess.
+    samples : Samples
+        The hull's vertices.
+    points : (n, 3) float
+        The blocks, which set how far the sheet must reach.
+    options : FitOptions
+        See there.
+    """
+    system, sheet, half = _start(medial, points, options)
+    slip: Floats | None = None
+    near, smoothing = medial.uv, options.smooth
+    for turn in range(options.rounds):
+        foot = sheet.search(near, options.reach).feet(samples.points)
+        misfit = options.first if turn == 0 else options.later
+        accepted = _accept(sheet, half, slip, foot, samples, misfit, options)
+        sheet, half, w, roughness, smoothing = _refit(system, sheet, accepted, smoothing, options)
+        near = accepted.foot.U[accepted.keep]
+        slip = slip_potential(sheet, near, w, system.bending)
+    if slip is None:
+        raise ValueError("FitOptions.rounds must be at least 1")
+    share = float(accepted.keep.mean())
+    return FittedSheet(sheet, half, slip, near, roughness, smoothing, share)

@@ -1,0 +1,116 @@
+"""Prism layers along the mid surface's normals, and the ladder that keeps them upright."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from geounfold.geometry import tet_volumes, unique_edges
+from geounfold.mesh import Bools, Floats, Ints
+from geounfold.prisms import prism_tets
+
+FRACTIONS = (-1.0, -0.6, 0.0, 0.6, 1.0)
+"""Layers as shares of the offset on their side, from the bottom up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Nodes of the prisms in both spaces, as functions of the offsets per node and side.
+
+    Attributes
+    ----------
+    P, normal : (n, 3) float
+        Mid surface and its unit normals at the footprint's nodes.
+    flat : (n, 2) float
+        Flattened mid surface.
+    slope_up, slope_down : (n, 2) float
+        Change of the unfolded position per unit of height above / below the mid surface.
+    F : (m, 3) int
+        The footprint's triangles.
+    curvature : (2, n) float
+        Curvature that makes normals converge above (row 0) and below (row 1).
+    up, down : (n,) float
+        Offsets: how far the mesh reaches above and below the mid surface.
+    """
+
+    P: Floats
+    normal: Floats
+    flat: Floats
+    slope_up: Floats
+    slope_down: Floats
+    F: Ints
+    curvature: Floats
+    up: Floats
+    down: Floats
+
+    @property
+    def heights(self) -> list[Floats]:
+        """Signed height of every layer at every node, bottom first."""
+        return [f * (self.up if f >= 0 else self.down) for f in FRACTIONS]
+
+    @property
+    def folded(self) -> Floats:
+        """Folded vertices, layer by layer, (5 n, 3)."""
+        return np.concatenate([self.P + q[:, None] * self.normal for q in self.heights])
+
+    @property
+    def unfolded(self) -> Floats:
+        """Unfolded vertices, layer by layer, (5 n, 3); z is the height."""
+        rows = []
+        for f, q in zip(FRACTIONS, self.heights, strict=True):
+            slope = self.slope_up if f >= 0 else self.slope_down
+            rows.append(np.column_stack([self.flat + np.abs(q)[:, None] * slope, q]))
+        return np.concatenate(rows)
+
+    def tets(self) -> Ints:
+        """Return the tetrahedra, right-handed where upright."""
+        return prism_tets(self.F, len(self.P), len(FRACTIONS))
+
+
+def bad_nodes(layers: Layers, T: Ints, least: float = 1e-4) -> Ints:
+    """Return the footprint nodes of tetrahedra that are inverted or nearly flat in a space.
+
+    Parameters
+    ----------
+    layers : Layers
+        The prisms.
+    T : (m, 4) int
+        Their tetrahedra.
+    least : float
+        Least volume accepted, as a share of the median volume.
+    """
+    v0, v1 = tet_volumes(layers.folded, T), tet_volumes(layers.unfolded, T)
+    bad = (v0 <= least * np.median(v0)) | (v1 <= least * np.median(v1))
+    return np.unique(T[bad] % len(layers.P))
+
+
+def neighbour_mean(F: Ints, n: int) -> sp.csr_array:
+    """Return the (n, n) matrix that averages over each node's neighbours."""
+    E = unique_edges(F)
+    A = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n))
+    A = (A + A.T).tocsr()
+    return sp.csr_array(sp.diags_array(1 / np.maximum(np.asarray(A.sum(axis=1)).ravel(), 1)) @ A)
+
+
+def shrink(layers: Layers, nodes: Ints, mean: sp.csr_array, factor: float = 0.9) -> Layers:
+    """Return the layers with the offsets at some nodes shrunk on the converging side only.
+
+    Neighbours follow half-way, so that the mesh's top and bottom stay smooth.
+    """
+    offsets = []
+    bend = np.stack([layers.curvature[0] * layers.up, layers.curvature[1] * layers.down])
+    for side, c in enumerate((layers.up, layers.down)):
+        mine, other = bend[side][nodes], bend[1 - side][nodes]
+        turn = (mine > 0.3) | (mine > other + 0.1) | ((mine <= 0.3) & (other <= 0.3))
+        f = np.ones(len(c))
+        f[nodes[turn]] = factor
+        f = np.minimum(f, mean @ f)
+        offsets.append(np.maximum(c * f, 0.05))
+    return replace(layers, up=offsets[0], down=offsets[1])
+
+
+def inverted_blocks(layers: Layers, T: Ints, tet_of_block: Ints, misses: Bools) -> Ints:
+    """Return the footprint nodes of the tetrahedra that hold blocks failing the round trip."""
+    return np.unique(T[tet_of_block[misses]] % len(layers.P))

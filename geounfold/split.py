@@ -1,10 +1,33 @@
-"""Split a closed hull into top (hanging wall), bottom (footwall) and rim."""
+"""Split a closed hull into top (hanging wall), bottom (footwall) and rim.
+
+``signed`` labels the faces by the lowest eigenvector of a signed graph Laplacian: neighbours
+pull towards the same sign, faces that look at each other across the body towards opposite
+signs.  It knows no vertical, so it holds on overturned folds.  ``normal`` is the thesis's
+filter on the normals' vertical component (section 3.2.2).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-from geounfold.mesh import Bools, Floats, Ints, TriMesh
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from geounfold.backends import igl as _igl
+from geounfold.errors import NoSheetError, OptionError, SplitError
+from geounfold.geometry import face_normals, triangle_areas
+from geounfold.mesh import Bools, Floats, Ints, TriMesh, as_trimesh
+
+CREASE_WIDTH = 0.05  # 1 - cosine at which two neighbours' pull has fallen to 1/e
+WEAKEST_PULL = 1e-3  # pull that is left across the sharpest edge
+CREASE_COSINE = 0.866  # neighbours' normals more than 30 degrees apart: the rim's crease
+FACING = 0.5  # faces are opposite when -N.N' exceeds this
+THICKEST = 2.0  # a ray longer than this many medians has missed the other side
+NORMAL_THRESHOLD = 0.3  # |normal's component along up| above which a face is top or bottom
+DECISIVE = 0.05  # |mean cosine| of the top's normals along an axis that decides which is top
+MIN_EXTENT = 4.5  # area of a side over the squared thickness below which there is no sheet
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,3 +62,203 @@ class SurfaceSplit:
     median_thickness: float
     adjacency: Ints
     flipped_up: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """What both methods measure on the hull's faces."""
+
+    normal: Floats
+    area: Floats
+    adjacency: Ints
+    hit: Ints
+    distance: Floats
+    facing: Floats
+    median: float
+
+
+def split(mesh: TriMesh, method: str = "signed", up: Floats | None = None) -> SurfaceSplit:
+    """Split a closed hull into top, bottom and rim.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        A closed, outward, manifold hull in working units, or its (V, F).
+    method : str
+        A name in SPLITS: ``signed`` or ``normal``.
+    up : (3,) float, optional
+        Direction towards the top, in working coordinates.  Decides once for the whole sheet:
+        the top is the side whose area-weighted normals look along it.  Default: the frame's
+        third axis.
+
+    Returns
+    -------
+    SurfaceSplit
+
+    Raises
+    ------
+    OptionError
+        Unknown method, or ``up`` is no direction.
+    NoSheetError
+        The body has no two opposite surfaces.
+    SplitError
+        The mesh is not closed, or the eigenproblem failed.
+
+    Notes
+    -----
+    Where the mean cosine between ``up`` and the top's normals is below 0.05 (a vertical
+    sheet), the frame's third, second and first axis are asked in this order, and the larger
+    side is the top when none of them decides.
+    """
+    if method not in SPLITS:
+        raise OptionError(f"unknown split '{method}'; valid: {', '.join(SPLITS)}")
+    mesh = as_trimesh(mesh)
+    result = SPLITS[method](mesh, _direction(up))
+    check_sheet(result)
+    return result
+
+
+def split_signed(mesh: TriMesh, up: Floats | None = None) -> SurfaceSplit:
+    """Split by the lowest eigenvector of the signed Laplacian of the face graph.
+
+    Neighbours i, j pull to the same sign with weight ``exp((N_i.N_j - 1) / 0.05) + 0.001``,
+    a face and the one its inward ray meets to opposite signs with weight
+    ``max(0, -N_i.N_j)^2 exp(-d / median d)``.
+
+    Parameters and errors as in `split`; ``side`` is +1 or -1 on every face.
+    """
+    faces = _measure(mesh)
+    x = _lowest_vector(_signed_laplacian(faces))
+    side = np.where(x >= 0, 1, -1)
+    return _result(mesh, faces, side, up)
+
+
+def split_normal(mesh: TriMesh, up: Floats | None = None) -> SurfaceSplit:
+    """Split by the normals' component along up, as the thesis does (section 3.2.2).
+
+    Faces whose component exceeds 0.3 are top, below -0.3 bottom, the others (``side`` 0) rim.
+    Overturned limbs are labelled wrongly; kept for comparison.
+
+    Parameters and errors as in `split`; ``up`` defaults to the frame's third axis.
+    """
+    faces = _measure(mesh)
+    along = faces.normal @ (_AXES[2] if up is None else up)
+    side = np.where(along > NORMAL_THRESHOLD, 1, 0) - np.where(along < -NORMAL_THRESHOLD, 1, 0)
+    result = _result(mesh, faces, side, up)
+    return replace(result, side=side, flipped_up=False)
+
+
+SPLITS: dict[str, Callable[[TriMesh, Floats | None], SurfaceSplit]] = {
+    "signed": split_signed,
+    "normal": split_normal,
+}
+
+_AXES = np.eye(3)
+
+
+def _direction(up: Floats | None) -> Floats | None:
+    if up is None:
+        return None
+    vector = np.asarray(up, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise OptionError(f"up must be three finite numbers, not all zero, but is {up}")
+    out: Floats = vector / np.linalg.norm(vector)
+    return out
+
+
+def _measure(mesh: TriMesh) -> _Faces:
+    """Return normals, areas, neighbours and opposite faces."""
+    V = mesh.V - mesh.V.mean(axis=0)
+    N = face_normals(V, mesh.F)
+    adjacency = _igl.triangle_adjacency(mesh.F)
+    if (adjacency < 0).any():
+        raise SplitError("the hull is not closed, so it has no inside; try hull 'density'")
+    start = V[mesh.F].mean(axis=1) - 1e-3 * N
+    hit, distance = _igl.SurfaceIndex(V, mesh.F).first_hit(start, -N)
+    facing = np.where(hit >= 0, -np.einsum("ij,ij->i", N, N[hit]), 0.0)
+    across = facing > FACING
+    if not across.any():
+        raise NoSheetError("no two faces of the body look at each other, so there is no sheet")
+    area = triangle_areas(V, mesh.F)
+    return _Faces(N, area, adjacency, hit, distance, facing, float(np.median(distance[across])))
+
+
+def _signed_laplacian(faces: _Faces) -> sp.csc_array:
+    """Return D - A + B: A the pull of neighbours, B the push of opposite faces (symmetrised)."""
+    n = len(faces.normal)
+    i, j = np.repeat(np.arange(n), 3), faces.adjacency.ravel()
+    cosine = np.einsum("ij,ij->i", faces.normal[i], faces.normal[j]).clip(-1, 1)
+    pull = np.exp((cosine - 1) / CREASE_WIDTH) + WEAKEST_PULL
+    seen = np.flatnonzero(faces.facing > 0)
+    hit = faces.hit[seen]
+    push = faces.facing[seen] ** 2 * np.exp(-faces.distance[seen] / faces.median) / 2
+    rows, columns = np.concatenate([i, seen, hit]), np.concatenate([j, hit, seen])
+    degree = np.bincount(rows, np.concatenate([pull, push, push]), n)
+    values = np.concatenate([degree, -pull, push, push])
+    diagonal = np.arange(n)
+    at = np.concatenate([diagonal, rows]), np.concatenate([diagonal, columns])
+    return sp.coo_array((values, at), (n, n)).tocsc()
+
+
+def _lowest_vector(L: sp.csc_array) -> Floats:
+    """Return the eigenvector (n,) of the lowest eigenvalue, by shift-invert Lanczos."""
+    n = L.shape[0]
+    shifted = sp.csc_array(L + 1e-6 * sp.eye_array(n))
+    lu = spl.splu(shifted, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    solve = spl.LinearOperator((n, n), matvec=lu.solve, dtype=np.float64)
+    start = np.cos(np.arange(n) * 2.399963)
+    try:
+        _, vectors = spl.eigsh(L, k=1, sigma=-1e-6, which="LM", OPinv=solve, v0=start, tol=1e-8)
+    except spl.ArpackNoConvergence as error:
+        raise SplitError("the signed split did not converge; try split 'normal'") from error
+    out: Floats = vectors[:, 0]
+    return out
+
+
+def _result(mesh: TriMesh, faces: _Faces, side: Ints, up: Floats | None) -> SurfaceSplit:
+    """Return the split with its rim, turned so that the top looks up."""
+    beside = side[faces.adjacency]
+    cosine = np.einsum("ij,ikj->ik", faces.normal, faces.normal[faces.adjacency]).min(axis=1)
+    rim = (faces.hit < 0) | (faces.facing < FACING) | (side == 0)
+    rim |= faces.distance > THICKEST * faces.median
+    rim |= (cosine < CREASE_COSINE) | (beside != side[:, None]).any(axis=1)
+    default = _orientation(faces, np.where(rim, 0, side), None)
+    turn = default if up is None else _orientation(faces, np.where(rim, 0, side), up)
+    return SurfaceSplit(
+        mesh=mesh,
+        side=side * turn,
+        rim=rim,
+        opposite=faces.hit,
+        thickness=faces.distance,
+        median_thickness=faces.median,
+        adjacency=faces.adjacency,
+        flipped_up=turn != default,
+    )
+
+
+def _orientation(faces: _Faces, side: Ints, up: Floats | None) -> int:
+    """Return +1 where side +1 is the top already, else -1 (see `split` for the rule)."""
+    weight = faces.area * side
+    covered = faces.area[side != 0].sum()
+    for axis in [*([] if up is None else [up]), _AXES[2], _AXES[1], _AXES[0]]:
+        looks = float(weight @ (faces.normal @ axis))
+        if abs(looks) > DECISIVE * covered:
+            return 1 if looks > 0 else -1
+    return 1 if weight.sum() >= 0 else -1
+
+
+def side_extent(result: SurfaceSplit) -> tuple[float, float]:
+    """Return the area of top and of bottom away from the rim, over the squared thickness."""
+    area = triangle_areas(result.mesh.V, result.mesh.F) / result.median_thickness**2
+    top, bottom = (float(area[(result.side == s) & ~result.rim].sum()) for s in (1, -1))
+    return top, bottom
+
+
+def check_sheet(result: SurfaceSplit) -> None:
+    """Raise NoSheetError where a side is too small for its thickness: a ball, a cube."""
+    extent = min(side_extent(result))
+    if extent < MIN_EXTENT:
+        raise NoSheetError(
+            "the body has no two opposite surfaces to flatten: each covers only "
+            f"{extent:.1f} times its thickness squared (a sheet has at least {MIN_EXTENT:g})"
+        )

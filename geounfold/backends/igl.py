@@ -106,7 +106,9 @@ def is_manifold(F: Ints) -> bool:
     return edge_ok and bool(np.all(vertex[0] if isinstance(vertex, tuple) else vertex))
 
 
-def marching_cubes(field: Floats, origin: Floats, step: Floats, level: float) -> tuple[Floats, Ints]:
+def marching_cubes(
+    field: Floats, origin: Floats, step: Floats, level: float
+) -> tuple[Floats, Ints]:
     """Return the level surface of a regular grid as (V, F), outward where the field falls.
 
     Parameters
@@ -126,6 +128,26 @@ def marching_cubes(field: Floats, origin: Floats, step: Floats, level: float) ->
     grid[..., 2] = axes[2][:, None, None]
     values = np.ascontiguousarray(field.transpose(2, 1, 0)).ravel().astype(np.float64)
     V, F = igl.marching_cubes(values, grid.reshape(-1, 3), nx, ny, nz, level)[:2]
+    return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
+
+
+def marching_cubes_sparse(
+    field: Floats, nodes: Floats, cubes: Ints, level: float
+) -> tuple[Floats, Ints]:
+    """Return the level surface in the given cubes as (V, F), outward where the field falls.
+
+    Parameters
+    ----------
+    field : (n,) float
+        Values at the nodes.
+    nodes : (n, 3) float
+        Positions of the nodes.
+    cubes : (c, 8) int
+        Corners of each cube: counter-clockwise on its lower face, then on its upper face.
+    level : float
+        Value on the surface.
+    """
+    V, F = igl.marching_cubes(_f(field), _f(nodes), _i(cubes), float(level))[:2]
     return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
 
 

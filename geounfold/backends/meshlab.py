@@ -1,0 +1,123 @@
+"""MeshLab's filters: remeshing and surface reconstruction.  Plain arrays in and out.
+
+pymeshlab is slow to import, so it is imported on first use.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import BackendError, MissingDependencyError
+from geounfold.mesh import Floats, Ints
+
+
+def _pymeshlab() -> Any:
+    try:
+        import pymeshlab
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"pymeshlab cannot be loaded ({error}); install it and the system library it names"
+        ) from error
+    return pymeshlab
+
+
+def _mesh_set(V: Floats, F: Ints | None = None, normals: Floats | None = None) -> Any:
+    ml = _pymeshlab()
+    parts: dict[str, Any] = {"vertex_matrix": np.ascontiguousarray(V, dtype=np.float64)}
+    if F is not None:
+        parts["face_matrix"] = np.ascontiguousarray(F, dtype=np.int32)
+    if normals is not None:
+        parts["v_normals_matrix"] = np.ascontiguousarray(normals, dtype=np.float64)
+    meshes = ml.MeshSet(verbose=False)
+    meshes.add_mesh(ml.Mesh(**parts))
+    return meshes
+
+
+def _apply(meshes: Any, name: str, **options: Any) -> None:
+    ml = _pymeshlab()
+    try:
+        meshes.apply_filter(name, **options)
+    except ml.PyMeshLabException as error:
+        raise BackendError(f"MeshLab's {name} failed: {error}") from error
+
+
+def _arrays(meshes: Any) -> tuple[Floats, Ints]:
+    mesh = meshes.current_mesh()
+    V = np.array(mesh.vertex_matrix(), dtype=np.float64)
+    return V, np.array(mesh.face_matrix(), dtype=np.int64)
+
+
+def remesh(V: Floats, F: Ints, length: float, iterations: int = 3) -> tuple[Floats, Ints]:
+    """Return an isotropic triangulation of the same surface with edges of about ``length``."""
+    meshes = _mesh_set(V, F)
+    _apply(
+        meshes,
+        "meshing_isotropic_explicit_remeshing",
+        iterations=iterations,
+        targetlen=_pymeshlab().PureValue(length),
+        checksurfdist=False,
+    )
+    return _arrays(meshes)
+
+
+def alpha_shape(points: Floats, alpha: float) -> tuple[Floats, Ints]:
+    """Return the boundary faces of the alpha shape of points (n, 3); ``alpha`` is a radius."""
+    meshes = _mesh_set(points)
+    _apply(
+        meshes,
+        "generate_alpha_shape",
+        alpha=_pymeshlab().PureValue(alpha),
+        filtering="Alpha Shape",
+    )
+    return _arrays(meshes)
+
+
+def ball_pivoting(points: Floats, normals: Floats, radius: float) -> tuple[Floats, Ints]:
+    """Return the triangles on which a ball of the given radius rests, with points as vertices."""
+    meshes = _mesh_set(points, normals=normals)
+    _apply(
+        meshes,
+        "generate_surface_reconstruction_ball_pivoting",
+        ballradius=_pymeshlab().PureValue(radius),
+    )
+    return _arrays(meshes)
+
+
+def poisson(points: Floats, normals: Floats, depth: int) -> tuple[Floats, Ints]:
+    """Return the screened Poisson surface of oriented points, on an octree of given depth."""
+    meshes = _mesh_set(points, normals=normals)
+    _apply(
+        meshes,
+        "generate_surface_reconstruction_screened_poisson",
+        depth=depth,
+        preclean=False,
+        threads=1,
+    )
+    return _arrays(meshes)
+
+
+def repair_manifold(V: Floats, F: Ints) -> tuple[Floats, Ints]:
+    """Remove faces at non-manifold edges, split non-manifold vertices, drop degenerate faces."""
+    meshes = _mesh_set(V, F)
+    _apply(meshes, "meshing_remove_duplicate_faces")
+    _apply(meshes, "meshing_remove_null_faces")
+    _apply(meshes, "meshing_repair_non_manifold_edges", method="Remove Faces")
+    _apply(meshes, "meshing_repair_non_manifold_vertices", vertdispratio=0.0)
+    _apply(meshes, "meshing_remove_unreferenced_vertices")
+    return _arrays(meshes)
+
+
+def close_holes(V: Floats, F: Ints, edges: int) -> tuple[Floats, Ints]:
+    """Close holes whose border has at most the given number of edges."""
+    meshes = _mesh_set(V, F)
+    _apply(meshes, "meshing_close_holes", maxholesize=edges, selfintersection=False)
+    return _arrays(meshes)
+
+
+def orient_coherently(V: Floats, F: Ints) -> tuple[Floats, Ints]:
+    """Turn faces so that neighbours agree (outwards or inwards is left to the caller)."""
+    meshes = _mesh_set(V, F)
+    _apply(meshes, "meshing_re_orient_faces_coherently")
+    return _arrays(meshes)

@@ -1,0 +1,117 @@
+"""From raw triangles to a hull: largest component, repair, orientation, remeshing, checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.backends import igl as _igl
+from geounfold.backends import meshlab
+from geounfold.errors import HullError
+from geounfold.geometry import enclosed_volume
+from geounfold.hull._result import Hull
+from geounfold.mesh import Bools, Floats, Ints, TriMesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class HullOptions:
+    """How hulls are made; lengths in working units (1 = one block).
+
+    Attributes
+    ----------
+    edge : float
+        Edge length of the hull.
+    remesh_iterations : int
+        Sweeps of isotropic remeshing.
+    sigma : float
+        Standard deviation of the density's blur, block sides.
+    level : float
+        Share of the inner density on the density hull.
+    shell : float
+        Points whose density share is below this make up the shell.
+    alpha : float or None
+        Radius of the alpha shape; None to find the smallest that encloses every point.
+    """
+
+    edge: float = 1.5
+    remesh_iterations: int = 3
+    sigma: float = 0.8
+    level: float = 0.5
+    shell: float = 0.9
+    alpha: float | None = None
+
+
+def finish(
+    V: Floats, F: Ints, *, method: str, blocks: int, inset: float, blur: float, options: HullOptions
+) -> Hull:
+    """Return the hull made of the largest component of raw, closed triangles.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices, working units.
+    F : (m, 3) int
+        Faces of a closed manifold surface, any orientation that is coherent.
+    method, inset, blur
+        As in Hull.
+    blocks : int
+        Number of blocks: the volume in working units.
+    options : HullOptions
+        Edge length and remeshing.
+
+    Raises
+    ------
+    HullError
+        The surface is not closed or not manifold, before or after remeshing.
+    """
+    keep = largest_component(F)
+    V, F = compact(V, F[keep])
+    check_closed_manifold(F, method)
+    if enclosed_volume(V, F) < 0:
+        F = F[:, ::-1]
+    V, F = meshlab.remesh(V, F, options.edge, options.remesh_iterations)
+    kept = largest_component(F)
+    V, F = compact(V, F[kept])
+    check_closed_manifold(F, method)
+    volume = enclosed_volume(V, F)
+    if volume <= 0:
+        raise HullError(f"the {method} hull encloses no volume; {_advice(method)}")
+    return Hull(
+        mesh=TriMesh(V, F),
+        method=method,
+        volume=volume,
+        blocks_volume=float(blocks),
+        inset=inset,
+        blur=blur,
+        dropped=int((~keep).sum()),
+    )
+
+
+def largest_component(F: Ints) -> Bools:
+    """Return which faces belong to the component (across edges) with the most faces, (m,)."""
+    component = _igl.face_components(F)
+    out: Bools = component == np.bincount(component).argmax()
+    return out
+
+
+def compact(V: Floats, F: Ints) -> tuple[Floats, Ints]:
+    """Return the mesh without unused vertices."""
+    used, inverse = np.unique(F, return_inverse=True)
+    return V[used], inverse.reshape(F.shape)
+
+
+def check_closed_manifold(F: Ints, method: str) -> None:
+    """Raise HullError unless every edge has two faces and every vertex one fan of faces."""
+    if len(F) < 4:
+        raise HullError(f"the {method} hull has no faces; {_advice(method)}")
+    if not _igl.is_manifold(F):
+        raise HullError(f"the {method} hull is not manifold; {_advice(method)}")
+    open_edges = int((_igl.triangle_adjacency(F) < 0).sum())
+    if open_edges:
+        raise HullError(f"the {method} hull has {open_edges} open edges; {_advice(method)}")
+
+
+def _advice(method: str) -> str:
+    other = "alpha" if method == "density" else "density"
+    return f"try hull '{other}'"

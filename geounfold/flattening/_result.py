@@ -41,6 +41,8 @@ class Flattening:
         (Wang 2002) and the root mean square edge strain.
     flips : int
         Triangles whose flat area is not positive.
+    note : str
+        What the method had to do beyond its plain course (a fall-back, a safeguard); else empty.
     """
 
     mesh: TriMesh
@@ -52,3 +54,4 @@ class Flattening:
     energy: Floats = field(default_factory=lambda: np.empty(0))
     area_error: Floats = field(default_factory=lambda: np.empty(0))
     edge_error: Floats = field(default_factory=lambda: np.empty(0))
+    note: str = ""

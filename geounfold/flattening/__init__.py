@@ -1,0 +1,143 @@
+"""Flatten a surface: one contract, a table of methods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from geounfold.errors import OptionError
+from geounfold.flattening._problem import Problem, make_problem
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening.initial import check_disk
+from geounfold.flattening.initial import tutte as _tutte
+from geounfold.flattening.spring import SpringOptions, spring
+from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
+
+__all__ = ["FLATTENERS", "Flattener", "Flattening", "SpringOptions", "Stop", "flatten", "tutte"]
+
+
+@dataclass(frozen=True)
+class Flattener:
+    """A method of the table.
+
+    Attributes
+    ----------
+    name : str
+        Its name in FLATTENERS.
+    function : callable
+        ``function(problem, start, options) -> Flattening``.
+    intrinsic : bool
+        Whether it works on edge lengths alone, so that other rest lengths can be given.
+    options : type
+        Its options, a frozen dataclass that checks itself.
+    """
+
+    name: str
+    function: Callable[[Problem, Floats | None, Any], Flattening]
+    intrinsic: bool
+    options: type
+
+
+#: The methods by name.
+FLATTENERS: dict[str, Flattener] = {
+    f.name: f for f in (Flattener("spring", spring, True, SpringOptions),)
+}
+
+
+def flatten(
+    mesh: TriMesh | tuple[Floats, Ints],
+    method: str = "spring",
+    *,
+    start: ArrayLike | None = None,
+    rest: ArrayLike | None = None,
+    options: Any = None,
+) -> Flattening:
+    """Lay a surface flat.
+
+    Parameters
+    ----------
+    mesh : TriMesh or (V, F)
+        A surface of disk topology, holes allowed: one component, (n, 3) vertices, faces
+        oriented alike.  The longest border loop is the outer one.
+    method : str
+        A name in FLATTENERS.
+    start : (n, 2) array, optional
+        Flat positions to start from; by default Tutte's embedding.
+    rest : (k,) array, optional
+        Length that each edge of ``geometry.unique_edges(F)`` should have when flat, in the
+        vertices' unit; by default its length in the mesh.  For intrinsic methods alone.
+    options : dataclass, optional
+        The method's options; by default its defaults.
+
+    Returns
+    -------
+    Flattening
+        Flat positions in the mesh's unit and vertex order, centred at zero, never mirrored.
+
+    Raises
+    ------
+    MeshError
+        The surface is no disk, or has degenerate faces or unused vertices.
+    OptionError
+        Unknown method, options of another method, a start or rest lengths of a wrong shape or
+        value, or rest lengths for a method that cannot use them.
+    FlatteningError
+        The method gave no valid answer.
+
+    Examples
+    --------
+    >>> V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> flat = flatten((V, np.array([[0, 1, 2], [0, 2, 3]])))
+    >>> flat.flips, str(flat.stop)
+    (0, 'converged')
+    """
+    if method not in FLATTENERS:
+        raise OptionError(f"unknown flattener {method!r}, choose from {', '.join(FLATTENERS)}")
+    flattener = FLATTENERS[method]
+    chosen = flattener.options() if options is None else options
+    if not isinstance(chosen, flattener.options):
+        wanted, given = flattener.options.__name__, type(chosen).__name__
+        raise OptionError(f"{method} takes options of type {wanted}, not {given}")
+    problem = _problem(mesh, rest, flattener)
+    return flattener.function(problem, _checked_start(start, len(problem.mesh.V)), chosen)
+
+
+def tutte(mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None = None) -> Floats:
+    """Return Tutte's embedding of a disk, (n, 2): no triangle flips, lengths not kept.
+
+    See ``flatten`` for the parameters and ``initial.tutte`` for the method.
+    """
+    return _tutte(_problem(mesh, rest, None))
+
+
+def _problem(
+    mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None, flattener: Flattener | None
+) -> Problem:
+    """Return the checked problem."""
+    surface = as_trimesh(mesh)
+    loops = check_disk(surface)
+    if rest is None:
+        return make_problem(surface, loops, None)
+    if flattener is not None and not flattener.intrinsic:
+        raise OptionError(f"{flattener.name} works on the mesh itself and cannot take rest lengths")
+    wanted = np.asarray(rest, dtype=np.float64)
+    edges = len(surface.V) + len(surface.F) + len(loops) - 2  # Euler
+    if wanted.shape != (edges,):
+        raise OptionError(f"rest must have shape ({edges},), one per edge, but has {wanted.shape}")
+    if not (np.isfinite(wanted).all() and (wanted > 0).all()):
+        raise OptionError("rest lengths must be finite and positive")
+    return make_problem(surface, loops, wanted)
+
+
+def _checked_start(start: ArrayLike | None, n: int) -> Floats | None:
+    """Return a copy of the start, or None."""
+    if start is None:
+        return None
+    uv = np.array(start, dtype=np.float64)
+    if uv.shape != (n, 2) or not np.isfinite(uv).all():
+        raise OptionError(f"start must be finite and of shape ({n}, 2), but has {uv.shape}")
+    return uv

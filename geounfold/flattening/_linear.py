@@ -1,0 +1,55 @@
+"""Sparse symmetric systems over a mesh's vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from geounfold.mesh import Floats, Ints
+
+
+def factor(matrix: sp.csc_array, ordered: bool = False) -> spl.SuperLU:
+    """Return the sparse factors of a symmetric matrix, pivots taken from the diagonal.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+        Symmetric; positive definite for a stable answer.
+    ordered : bool
+        True when the rows already are in a fill-reducing order.
+    """
+    return spl.splu(
+        matrix,
+        permc_spec="NATURAL" if ordered else "MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+
+def incidence(edges: Ints, n: int) -> sp.csr_array:
+    """Return the signed incidence matrix of edges, (k, n): -1 at the first end, +1 at the other."""
+    k = len(edges)
+    rows = np.repeat(np.arange(k), 2)
+    return sp.csr_array((np.tile([-1.0, 1.0], k), (rows, edges.ravel())), shape=(k, n))
+
+
+def pinned_solver(laplacian: sp.csc_array) -> tuple[Callable[[Floats], Floats], Ints]:
+    """Return a solver of ``L x = b`` (b sums to zero) with x[0] = 0, and a fill-reducing order.
+
+    The order gives each vertex's place, (n,); vertex 0 comes last.
+    """
+    n = laplacian.shape[0]
+    lu = factor(sp.csc_array(laplacian[1:, 1:]))
+
+    def solve(b: Floats) -> Floats:
+        out = np.zeros_like(b)
+        out[1:] = lu.solve(np.ascontiguousarray(b[1:]))
+        return out
+
+    place = np.empty(n, dtype=np.int64)
+    place[1:] = lu.perm_c
+    place[0] = n - 1
+    return solve, place

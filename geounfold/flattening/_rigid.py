@@ -1,0 +1,48 @@
+"""As-rigid-as-possible steps: the warm start of the springs."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from geounfold.flattening._linear import incidence, pinned_solver
+from geounfold.flattening._problem import Problem
+from geounfold.mesh import Floats, Ints
+
+
+class RigidSteps:
+    """Local-global steps of the ARAP energy on rest triangles (Liu et al. 2008).
+
+    Each step turns every rest triangle to its image and solves one Laplacian system, factored
+    once.  It works on rest lengths alone, so it also serves lengths along arcs.
+
+    Attributes
+    ----------
+    place : (n,) int
+        A fill-reducing order of the vertices, as found for the Laplacian.
+    """
+
+    place: Ints
+
+    def __init__(self, problem: Problem) -> None:
+        F, z = problem.mesh.F, problem.corners
+        n, m = len(problem.mesh.V), len(F)
+        first, second = [1, 2, 0], [2, 0, 1]
+        self._side = z[:, second] - z[:, first]
+        inner = (z[:, first] - z) * np.conj(z[:, second] - z)
+        cotangent = inner.real / (2 * problem.areas)[:, None]
+        ends = np.stack([F[:, first].ravel(), F[:, second].ravel()], axis=1)
+        self._difference = incidence(ends, n)
+        weight = sp.diags_array(cotangent.ravel() / 2)
+        self._pull = cotangent * np.conj(self._side)
+        self._solve, self.place = pinned_solver(sp.csc_array(self._gather @ self._difference))
+
+    def __call__(self, uv: Floats) -> Floats:
+        """Return the positions after one step, (n, 2), centred."""
+        now = (self._difference @ (uv[:, 0] + 1j * uv[:, 1])).reshape(-1, 3)
+        turn = (self._pull * now).sum(axis=1)
+        turn /= np.maximum(np.abs(turn), np.finfo(float).tiny)
+        load = self._gather @ (turn[:, None] * self._side).ravel()
+        out = self._solve(np.column_stack([load.real, load.imag]))
+        centred: Floats = out - out.mean(axis=0)
+        return centred

@@ -1,0 +1,273 @@
+"""Wang's spring energy brought to its minimum by Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.errors import FlatteningError, OptionError
+from geounfold.flattening._guard import FoldGuard
+from geounfold.flattening._linear import factor, incidence, pinned_solver
+from geounfold.flattening._problem import History, Problem, finish, flip_count
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening._rigid import RigidSteps
+from geounfold.flattening._springs import (
+    BlockPattern,
+    spring_blocks,
+    spring_energy,
+    spring_forces,
+)
+from geounfold.flattening.initial import tutte
+from geounfold.geometry import lengths
+from geounfold.mesh import Floats, Ints
+
+#: Least share of the predicted decrease that a step must bring (Armijo).
+ARMIJO = 1e-4
+
+#: Halvings of a step before the search gives up.
+HALVINGS = 30
+
+#: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard where a vertex
+#: and its neighbours lie on one line.
+RIDGE = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringOptions:
+    """Options of ``spring``.
+
+    Parameters
+    ----------
+    stiffness : float
+        Spring constant C: it scales the energy, not the answer.
+    tol : float
+        Stop where the last step moved no vertex by more than this share of the surface's size
+        and lowered the energy by no more than this share of itself.
+    max_iter : int
+        Largest number of Newton steps.
+    warm_strain : float
+        Edge strain (root mean square) of the start above which rigid steps come first.
+    warm_tol : float
+        Largest displacement, as a share of the size, at which the rigid steps end.
+    warm_max_iter : int
+        Largest number of rigid steps.
+    guard : bool
+        Whether a result with flipped triangles is redone with a barrier against folding.
+    """
+
+    stiffness: float = 1.0
+    tol: float = 1e-7
+    max_iter: int = 60
+    warm_strain: float = 0.05
+    warm_tol: float = 1e-3
+    warm_max_iter: int = 60
+    guard: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "tol", "warm_strain", "warm_tol"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise OptionError(f"spring: {name} must be positive, but is {value}")
+        for name, least in (("max_iter", 1), ("warm_max_iter", 0)):
+            value = getattr(self, name)
+            if value < least:
+                raise OptionError(f"spring: {name} must be at least {least}, but is {value}")
+
+
+def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Flattening:
+    """Flatten by minimising ``E = sum C/2 (|P_i P_j| - d_j)^2`` (thesis section 2.2.4).
+
+    A start far from its rest lengths (Tutte's) is first relaxed by a few rigid (ARAP) steps;
+    then Newton's method minimises the springs' energy, with the exact Hessian where that gives
+    a descent, else without the shortened springs' negative parts.  Springs alone may fold a
+    surface over at its minimum, doubly curved ones above all.  Such an answer is redone from
+    the last start without flips, with a barrier against lost triangles added; the note says so.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface.
+    start : (n, 2) float or None
+        Flat positions to start from; None takes Tutte's embedding.
+    options : SpringOptions
+        See there.
+
+    Returns
+    -------
+    Flattening
+        ``energy`` holds the start's, the relaxed start's (where there was one) and each Newton
+        step's energy; with the barrier it includes the barrier's.
+    """
+    first = tutte(problem) if start is None else start
+    warm, unfolded, rigid, place = _warm_start(problem, first, options)
+    system = _System(problem, place)
+    history = History.empty(problem)
+    history.record(first, options.stiffness * system.energy(first))
+    uv, steps, stop = _descend(system, warm, options, history)
+    if not np.isfinite(uv).all():
+        raise FlatteningError("spring: the flat positions are not finite")
+    flips = flip_count(uv, problem.mesh.F)
+    if flips == 0 or not options.guard:
+        note = f"{rigid} rigid steps first" if rigid else ""
+        return finish(problem, uv, "spring", stop, rigid + steps, history, note)
+    return _guarded(problem, place, unfolded, flips, rigid + steps, options)
+
+
+def _guarded(
+    problem: Problem,
+    place: Ints,
+    unfolded: Floats | None,
+    flips: int,
+    before: int,
+    options: SpringOptions,
+) -> Flattening:
+    """Return the flattening with the barrier, from a start without flips."""
+    if unfolded is None:
+        unfolded = tutte(problem)
+        if flip_count(unfolded, problem.mesh.F):
+            raise FlatteningError(
+                f"spring: the springs fold {flips} triangles over, and Tutte's embedding has "
+                "triangles too small to tell from folded ones: remesh the surface"
+            )
+        unfolded = _warm_start(problem, unfolded, options)[1]
+        if unfolded is None:  # Tutte's embedding itself has no flips
+            raise FlatteningError("spring: no start without flipped triangles was found")
+    history = History.empty(problem)
+    system = _System(problem, place, FoldGuard(problem.mesh.F, problem.areas))
+    uv, steps, stop = _descend(system, unfolded, options, history)
+    note = f"the springs alone fold {flips} triangles over: redone with a barrier against folding"
+    return finish(problem, uv, "spring", stop, before + steps, history, note)
+
+
+def _warm_start(
+    problem: Problem, start: Floats, options: SpringOptions
+) -> tuple[Floats, Floats | None, int, Ints]:
+    """Return the relaxed start, the last one without flips, the steps taken and an order."""
+    F, n = problem.mesh.F, len(problem.mesh.V)
+    unfolded = None if flip_count(start, F) else start
+    strain = lengths(start, problem.edges) / problem.rest - 1
+    if np.sqrt(np.mean(strain * strain)) <= options.warm_strain or not options.warm_max_iter:
+        gradient = incidence(problem.edges, n)
+        return start, unfolded, 0, pinned_solver((gradient.T @ gradient).tocsc())[1]
+    rigid, uv, steps = RigidSteps(problem), start, 0
+    while steps < options.warm_max_iter:
+        steps += 1
+        after = rigid(uv)
+        moved = float(np.abs(after - uv).max())
+        uv = after
+        if flip_count(uv, F) == 0:
+            unfolded = uv
+        if moved <= options.warm_tol * problem.size:
+            break
+    return uv, unfolded, steps, rigid.place
+
+
+class _System:
+    """The springs (C = 1), with or without the barrier, as a function to minimise."""
+
+    def __init__(self, problem: Problem, place: Ints, guard: FoldGuard | None = None) -> None:
+        self.problem, self.guard = problem, guard
+        self._pattern = BlockPattern(problem.edges, place)
+        self._key = problem.edges[:, 0] * len(place) + problem.edges[:, 1]
+
+    def energy(self, uv: Floats) -> float:
+        """Return the energy; infinite where the barrier is broken."""
+        value = spring_energy(uv, self.problem.edges, self.problem.rest)
+        return value if self.guard is None else value + self.guard.energy(uv)
+
+    def forces(self, uv: Floats) -> Floats:
+        """Return minus the energy's gradient, (n, 2)."""
+        force = spring_forces(uv, self.problem.edges, self.problem.rest)
+        if self.guard is None:
+            return force
+        F, slope, _, gradient = self.guard.near(uv)
+        push = (-slope[:, None, None] * gradient).reshape(-1, 2)
+        for k in range(2):
+            force[:, k] += np.bincount(F.ravel(), push[:, k], len(uv))
+        return force
+
+    def newton_step(self, uv: Floats, force: Floats, convex: bool) -> Floats | None:
+        """Return the solution of ``H s = force``, (n, 2); None where H cannot be factored."""
+        blocks = spring_blocks(uv, self.problem.edges, self.problem.rest, convex)
+        vertex, edge = self._pattern.stiffness(blocks)
+        if self.guard is not None:
+            self._add_barrier(uv, vertex, edge)
+        if convex:
+            vertex[:, [0, 1], [0, 1]] += RIDGE
+        _pin(uv, vertex)
+        try:
+            lu = factor(self._pattern.matrix(vertex, edge), ordered=True)
+        except RuntimeError:  # exactly singular: the caller takes the convex Hessian
+            return None
+        return self._pattern.gather(lu.solve(self._pattern.scatter(force)))
+
+    def _add_barrier(self, uv: Floats, vertex: Floats, edge: Floats) -> None:
+        """Add the barrier's (Gauss-Newton) second derivatives to the blocks."""
+        assert self.guard is not None
+        F, _, curvature, gradient = self.guard.near(uv)
+        n = len(uv)
+        for p in range(3):
+            outer = gradient[:, p, :, None] * gradient[:, p, None, :]
+            np.add.at(vertex, F[:, p], curvature[:, None, None] * outer)
+            q = (p + 1) % 3
+            outer = curvature[:, None, None] * gradient[:, p, :, None] * gradient[:, q, None, :]
+            swapped = F[:, p] > F[:, q]
+            outer[swapped] = outer[swapped].transpose(0, 2, 1)
+            low, high = np.minimum(F[:, p], F[:, q]), np.maximum(F[:, p], F[:, q])
+            np.add.at(edge, np.searchsorted(self._key, low * n + high), outer)
+
+
+def _pin(uv: Floats, vertex: Floats) -> None:
+    """Hold the three rigid motions by springs on two vertices; they carry no load."""
+    far = int(np.argmax(((uv - uv[0]) ** 2).sum(axis=1)))
+    across = np.array([-1.0, 1.0]) * (uv[far] - uv[0])[::-1]
+    across /= max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    vertex[0] += np.eye(2)
+    vertex[far] += np.outer(across, across)
+
+
+def _descend(
+    system: _System, uv: Floats, options: SpringOptions, history: History
+) -> tuple[Floats, int, Stop]:
+    """Return the minimiser, the steps taken and why they ended; each step is recorded."""
+    tol, size, scale = options.tol, system.problem.size, options.stiffness
+    # Energy of a strain of tol everywhere: below it, exactly developable surfaces are done.
+    floor = tol**2 * float((system.problem.rest**2).sum()) / 2
+    energy = system.energy(uv)
+    history.record(uv, scale * energy)
+    for count in range(1, options.max_iter + 1):
+        after, lower, predicted = _one_step(system, uv, energy)
+        moved = float(np.abs(after - uv).max())
+        small = tol * (lower + floor)
+        quiet = energy - lower <= small and (lower < energy or predicted <= small)
+        uv, energy = after, lower
+        history.record(uv, scale * energy)
+        if quiet and moved <= tol * size:
+            return uv, count, Stop.CONVERGED
+        if moved == 0:
+            return uv, count, Stop.MAX_ITER
+    return uv, options.max_iter, Stop.MAX_ITER
+
+
+def _one_step(system: _System, uv: Floats, energy: float) -> tuple[Floats, float, float]:
+    """Return positions and energy after one step, and the decrease its model predicts.
+
+    The same positions come back where no decrease was found.
+    """
+    force = system.forces(uv)
+    predicted = 0.0
+    for convex in (False, True):
+        step = system.newton_step(uv, force, convex)
+        slope = 0.0 if step is None else float((force * step).sum())
+        if step is None or not slope > 0:
+            continue
+        predicted = slope / 2
+        length = 1.0 if system.guard is None else system.guard.longest_step(uv, step)
+        for _ in range(HALVINGS):
+            after = uv + length * step
+            lower = system.energy(after)
+            if lower <= energy - ARMIJO * length * slope:
+                return after - after.mean(axis=0), lower, predicted
+            length /= 2
+    return uv, energy, predicted

@@ -26,14 +26,17 @@ class RigidSteps:
 
     def __init__(self, problem: Problem) -> None:
         F, z = problem.mesh.F, problem.corners
-        n, m = len(problem.mesh.V), len(F)
+        n = len(problem.mesh.V)
         first, second = [1, 2, 0], [2, 0, 1]
         self._side = z[:, second] - z[:, first]
         inner = (z[:, first] - z) * np.conj(z[:, second] - z)
         cotangent = inner.real / (2 * problem.areas)[:, None]
         ends = np.stack([F[:, first].ravel(), F[:, second].ravel()], axis=1)
         self._difference = incidence(ends, n)
-        weight = sp.diags_array(cotangent.ravel() / 2)
+        transposed = sp.csr_array(self._difference.T)
+        # A column's scale: half the cotangent of its side of its face.
+        transposed.data *= cotangent.ravel()[transposed.indices] / 2
+        self._gather = transposed
         self._pull = cotangent * np.conj(self._side)
         self._solve, self.place = pinned_solver(sp.csc_array(self._gather @ self._difference))
 

@@ -5,6 +5,7 @@ pymeshlab is slow to import, so it is imported on first use.
 
 from __future__ import annotations
 
+from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
@@ -120,4 +121,19 @@ def orient_coherently(V: Floats, F: Ints) -> tuple[Floats, Ints]:
     """Turn faces so that neighbours agree (outwards or inwards is left to the caller)."""
     meshes = _mesh_set(V, F)
     _apply(meshes, "meshing_re_orient_faces_coherently")
+    return _arrays(meshes)
+
+
+def read_mesh(path: str | PathLike[str]) -> tuple[Floats, Ints]:
+    """Return vertices (n, 3) and faces (m, 3) of a mesh file, polygons cut into triangles.
+
+    The kind follows the ending; coordinates keep double precision where the file has it.
+    """
+    ml = _pymeshlab()
+    meshes = ml.MeshSet(verbose=False)
+    try:
+        meshes.load_new_mesh(fspath(path))
+    except ml.PyMeshLabException as error:
+        details = str(error).rpartition("Error details:")[2]
+        raise BackendError(f"MeshLab cannot read it: {' '.join(details.split())}") from error
     return _arrays(meshes)

@@ -1,0 +1,267 @@
+"""The commands: check every path and option, read, compute, write all outputs together."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from geounfold.cli.console import Console
+from geounfold.errors import InputError, OptionError
+from geounfold.io import Outputs, PointTable, read_points, read_surface, write_json
+from geounfold.io.coordinates import Triple, parse_columns
+from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
+
+if TYPE_CHECKING:
+    from geounfold.pipeline import Mapped, UnfoldOptions
+
+_JSON = (".json",)
+_MAP = (".npz",)
+_HTML = (".html", ".htm")
+_PICTURE = (".png",)
+_UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
+_FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
+_TRUE: Triple = ("true_x", "true_y", "true_z")
+
+
+def unfold(args: Namespace, console: Console) -> None:
+    """Unfold a body and write everything that was asked for."""
+    if (args.samples is None) != (args.samples_out is None):
+        raise OptionError("--samples and --samples-out belong together: give both or neither")
+    outputs = Outputs.planned(
+        {
+            "--output": (args.output, TABLE_ENDINGS),
+            "--summary": (args.summary, _JSON),
+            "--map": (args.map, _MAP),
+            "--report": (args.report, _HTML),
+            "--samples-out": (args.samples_out, TABLE_ENDINGS),
+        },
+        _given(args.points, args.samples, args.top, args.bottom),
+        overwrite=args.overwrite,
+    )
+    table = _read(args.points, args, console)
+    samples = _read_samples(args, console)
+    surfaces = {
+        side: None if path is None else read_surface(path)
+        for side, path in (("top", args.top), ("bottom", args.bottom))
+    }
+    from geounfold import pipeline
+
+    result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
+    summary = {**result.summary(), "input": table.facts()}
+    columns = _columns(_UNFOLDED, result) | result.columns
+    carried = None if samples is None else _columns(_UNFOLDED, result.to_flat(samples.points))
+    console.stage("writing")
+    with outputs.writing() as parts:
+        table.write(parts["--output"], columns)
+        if samples is not None and carried is not None:
+            samples.write(parts["--samples-out"], carried)
+        if "--map" in parts:
+            result.save(parts["--map"])
+        if "--summary" in parts:
+            write_json(parts["--summary"], summary)
+        if "--report" in parts:
+            from geounfold.report import write_report
+
+            write_report(parts["--report"], summary, table.points, result.points, columns)
+    for warning in summary.get("warnings", []):
+        console.warn(str(warning))
+    console.done(f"{len(table)} points unfolded into {args.output}")
+
+
+def carry(args: Namespace, console: Console) -> None:
+    """Carry other points with a saved map, to the flat side or back."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, TABLE_ENDINGS)},
+        [args.map, args.points],
+        overwrite=args.overwrite,
+    )
+    existing_file(Path(args.map))
+    table = _read(args.points, args, console)
+    from geounfold import pipeline
+
+    saved = pipeline.load(args.map)
+    console.stage("carrying points")
+    if args.inverse:
+        columns = _columns(_FOLDED, saved.to_folded(table.points))
+        del columns["stratigraphic"]
+    else:
+        columns = _columns(_UNFOLDED, saved.to_flat(table.points))
+    with outputs.writing() as parts:
+        table.write(parts["--output"], columns)
+    console.done(f"{len(table)} points carried into {args.output}")
+
+
+def compare(args: Namespace, console: Console) -> None:
+    """Try flatteners on one body and write a table of how they did."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, TABLE_ENDINGS)}, [args.points], overwrite=args.overwrite
+    )
+    table = _read(args.points, args, console)
+    from geounfold import comparison
+
+    names = [name.strip() for name in args.flatteners.split(",")]
+    console.stage("comparing flatteners")
+    frame = comparison.compare(table.points, flatteners=None if names == ["all"] else names)
+    with outputs.writing() as parts:
+        write_table(parts["--output"], frame)
+    console.done(f"{len(frame)} rows written into {args.output}")
+
+
+def quality(args: Namespace, console: Console) -> None:
+    """Print how well an unfolding keeps distances, and how far from a truth it is."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, _JSON)},
+        _given(args.folded, args.unfolded, args.truth),
+        overwrite=args.overwrite,
+    )
+    folded = read_points(args.folded, _triple(args.columns))
+    unfolded = read_points(args.unfolded, _triple(args.unfolded_columns), prefer=(_UNFOLDED,))
+    truth = None
+    if args.truth is not None:
+        truth = read_points(args.truth, _triple(args.truth_columns), prefer=(_TRUE,))
+    for other in (unfolded, truth):
+        if other is not None and len(other) != len(folded):
+            raise InputError(
+                f"{other.source}: has {len(other)} rows, but {folded.source} has {len(folded)}; "
+                "rows must belong together one by one"
+            )
+    from geounfold.cli.figures import quality_figures
+
+    console.stage("measuring")
+    figures = quality_figures(
+        folded.points,
+        unfolded.points,
+        None if truth is None else truth.points,
+        _count(args.neighbours, "--neighbours"),
+    )
+    with outputs.writing() as parts:
+        if "--output" in parts:
+            write_json(parts["--output"], figures)
+    console.done("measured")
+    _print_figures(figures)
+
+
+def simulate(args: Namespace, console: Console) -> None:
+    """List the simulated bodies, or write one with its truth."""
+    from geounfold import synthetic
+
+    if args.list:
+        for name in synthetic.CASES:
+            sys.stdout.write(f"{name}\n")
+        return
+    if args.case is None or args.output is None:
+        raise OptionError("simulate needs CASE and -o OUT, or --list")
+    outputs = Outputs.planned({"--output": (args.output, TABLE_ENDINGS)}, overwrite=args.overwrite)
+    if args.case not in synthetic.CASES:
+        raise OptionError(f"no case '{args.case}'; there are {', '.join(synthetic.CASES)}")
+    frame = synthetic.simulate(args.case).frame()
+    with outputs.writing() as parts:
+        write_table(parts["--output"], frame)
+    console.done(f"{len(frame)} points written into {args.output}")
+
+
+def view(args: Namespace, console: Console) -> None:
+    """Draw a table of points into a picture."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, _PICTURE)}, [args.points], overwrite=args.overwrite
+    )
+    table = _read(args.points, args, console)
+    values = None if args.colour is None else table.numbers(args.colour)
+    from geounfold import plotting
+
+    console.stage("drawing")
+    with outputs.writing() as parts:
+        plotting.draw_points(parts["--output"], table.points, values=values, label=args.colour)
+    console.done(f"drawn into {args.output}")
+
+
+def _given(*paths: str | None) -> list[str]:
+    return [path for path in paths if path is not None]
+
+
+def _triple(text: str | None) -> Triple | None:
+    return None if text is None else parse_columns(text)
+
+
+def _read(path: str, args: Namespace, console: Console) -> PointTable:
+    """Read the points of a command, and say what was left out."""
+    console.stage(f"reading {path}")
+    columns = _triple(args.columns)
+    table = read_points(path, columns, drop_invalid=args.drop_invalid)
+    if len(table.dropped):
+        console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
+    return table
+
+
+def _read_samples(args: Namespace, console: Console) -> PointTable | None:
+    if args.samples is None:
+        return None
+    console.stage(f"reading {args.samples}")
+    columns = _triple(args.samples_columns)
+    table = read_points(args.samples, columns, drop_invalid=args.drop_invalid)
+    if len(table.dropped):
+        console.warn(f"{args.samples}: {len(table.dropped)} rows were left out")
+    return table
+
+
+def _columns(names: Triple, mapped: Mapped) -> dict[str, Any]:
+    """Return where points came to lie, by output column."""
+    points = {name: mapped.points[:, axis] for axis, name in enumerate(names)}
+    return {**points, "stratigraphic": mapped.stratigraphic, "location": mapped.location}
+
+
+def _options(args: Namespace) -> UnfoldOptions:
+    """Return the options that were given; the pipeline knows the others."""
+    from geounfold.pipeline import UnfoldOptions
+
+    readers: dict[str, Callable[[str], Any]] = {
+        "up": _direction,
+        "body": _body,
+        "neighbours": lambda text: _count(text, "--neighbours"),
+    }
+    names = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours")
+    given = {n: getattr(args, n) for n in names if hasattr(args, n)}
+    return UnfoldOptions(**{n: readers.get(n, str)(text) for n, text in given.items()})
+
+
+def _direction(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(word) for word in text.split(","))
+    except ValueError as error:
+        raise OptionError(f"--up needs three numbers such as 0,0,1, not '{text}'") from error
+    return x, y, z
+
+
+def _body(text: str) -> int | str:
+    if text == "all":
+        return text
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise OptionError(f"--body needs the number of a body (1, 2, ...) or all, not '{text}'")
+    return number
+
+
+def _count(text: str | None, option: str) -> int | None:
+    if text is None:
+        return None
+    if not text.isdecimal() or int(text) < 1:
+        raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
+    return int(text)
+
+
+def _print_figures(figures: dict[str, Any], indent: str = "") -> None:
+    """Print figures as aligned lines, groups under their names."""
+    width = max((len(name) for name in figures), default=0)
+    for name, value in figures.items():
+        if isinstance(value, dict):
+            sys.stdout.write(f"{indent}{name}\n")
+            _print_figures(value, indent + "  ")
+        else:
+            shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+            sys.stdout.write(f"{indent}{name:<{width}}  {shown}\n")

@@ -1,0 +1,255 @@
+"""The commands and their options.
+
+Options of the unfolding have no defaults here: what is not given is left to `UnfoldOptions`,
+which checks what is given and lists the valid values.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from geounfold import _version
+from geounfold.errors import OptionError
+
+_TABLES = ".csv, .csv.gz or .parquet"
+_RESULTS = """\
+results:
+  unfolded_x, unfolded_y, unfolded_z   coordinates with the folds taken out, in the input's
+                     unit; z is up towards the top side, in true thickness
+  stratigraphic      0 at the bottom surface, 1 at the top
+  location           inside, or extrapolated outside the control mesh
+"""
+_UNFOLD = (
+    _RESULTS
+    + """\
+  volume_ratio, nmd_error, stretch_min, stretch_max, shear   distortion of each block
+
+Every input column and row comes back in order. An input column called as a result is replaced
+in its place. Output tables are separated by commas, whatever the input's separator."""
+)
+_MAP = (
+    _RESULTS
+    + """\
+with --inverse:
+  folded_x, folded_y, folded_z         coordinates with the folds put back
+  location           as above
+
+Every input column and row comes back in order. An input column called as a result is replaced
+in its place."""
+)
+_EXIT = "exit status: 0 done, 2 input or options at fault, 1 anything else, 130 interrupted"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are errors of ours: one line, no usage text before it."""
+
+    def __init__(self, **settings: Any) -> None:
+        settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise OptionError instead of printing the usage and leaving."""
+        raise OptionError(f"{message} (see '{self.prog} --help')")
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Return the parsed arguments; `handler` names the command's function.
+
+    Raises
+    ------
+    OptionError
+        Unknown commands, options or values, or ones that are missing.
+    SystemExit
+        After ``--help`` and ``--version``, with status 0.
+    """
+    return build_parser().parse_args(_joined(argv))
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Return arguments with ``--up -1,0,0`` as one, which argparse takes for an option else."""
+    joined: list[str] = []
+    for word in argv:
+        if joined and joined[-1] == "--up" and word[:1] == "-":
+            joined[-1] = f"--up={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def build_parser() -> Parser:
+    """Return the parser of all commands."""
+    parser = Parser(
+        prog="geounfold",
+        description="Takes the folds out of an ore body, and puts them back.",
+        epilog=_EXIT,
+    )
+    parser.add_argument("--version", action="version", version=f"geounfold {_version.__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    common = _common()
+    _add_unfold(commands, common)
+    _add_map(commands, common)
+    _add_compare(commands, common)
+    _add_quality(commands, common)
+    _add_simulate(commands, common)
+    _add_view(commands, common)
+    return parser
+
+
+def _common() -> argparse.ArgumentParser:
+    """Return the options that every command has."""
+    common = argparse.ArgumentParser(add_help=False)
+    group = common.add_argument_group("all commands")
+    group.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
+    group.add_argument("--quiet", action="store_true", help="no progress and no warnings")
+    group.add_argument(
+        "-v", "--verbose", action="count", default=0, help="say more; twice for everything"
+    )
+    return common
+
+
+def _add_command(
+    commands: Any, name: str, summary: str, common: argparse.ArgumentParser, epilog: str = ""
+) -> Parser:
+    parser: Parser = commands.add_parser(
+        name,
+        parents=[common],
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"{epilog}\n\n{_EXIT}".strip(),
+    )
+    parser.set_defaults(handler=name)
+    return parser
+
+
+def _add_columns(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--columns",
+        metavar="A,B,C",
+        help="the coordinate columns, where they are not called x/y/z, centroid_x/y/z, "
+        "XC/YC/ZC, xcentre/ycentre/zcentre, easting/northing/elevation or alike",
+    )
+    parser.add_argument(
+        "--drop-invalid",
+        action="store_true",
+        help="go on without rows whose coordinates are missing or infinite; they are counted "
+        "in the summary and left out of the output",
+    )
+
+
+def _add_model(parser: argparse.ArgumentParser) -> None:
+    """Add the options that become `UnfoldOptions`."""
+    group = parser.add_argument_group("method")
+    given: dict[str, Any] = {"default": argparse.SUPPRESS}
+    group.add_argument(
+        "--method", metavar="M", help="sheet (default), thesis or ufo: how the map is made", **given
+    )
+    group.add_argument(
+        "--flattener", metavar="F", help="spring (default) or another: `compare` shows all", **given
+    )
+    group.add_argument(
+        "--hull",
+        metavar="H",
+        help="auto (default), alpha, ball_pivoting, poisson or density: the surface around the "
+        "body",
+        **given,
+    )
+    group.add_argument(
+        "--split",
+        metavar="S",
+        help="signed (default; holds on overturned folds) or normal: top from bottom",
+        **given,
+    )
+    group.add_argument("--up", metavar="X,Y,Z", help="direction of the top side", **given)
+    group.add_argument(
+        "--datum",
+        metavar="D",
+        help="mid (default), top, bottom or proportional: the surface that becomes flat",
+        **given,
+    )
+    group.add_argument(
+        "--body", metavar="N", help="which of several separate bodies, or all", **given
+    )
+    group.add_argument(
+        "--neighbours", metavar="K", help="neighbours per block in NMD (default 26)", **given
+    )
+
+
+def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD)
+    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_TABLES}")
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_TABLES)
+    parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
+    parser.add_argument("--map", metavar="M.npz", help="the map, for `geounfold map`")
+    parser.add_argument("--report", metavar="R.html", help="figures and pictures")
+    parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_TABLES}")
+    parser.add_argument("--samples-out", metavar="Q", help="where they go")
+    parser.add_argument(
+        "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
+    )
+    parser.add_argument(
+        "--top", metavar="T", help="the top surface: .ply, .obj, .stl, .off or a table"
+    )
+    parser.add_argument("--bottom", metavar="B", help="the bottom surface")
+    _add_columns(parser)
+    _add_model(parser)
+
+
+def _add_map(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(commands, "map", "carry other points with a saved map", common, _MAP)
+    parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
+    parser.add_argument("points", metavar="POINTS", help=_TABLES)
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_TABLES)
+    parser.add_argument("--inverse", action="store_true", help="from unfolded to folded")
+    _add_columns(parser)
+
+
+def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands, "compare", "try every flattener on the same surfaces of a body", common
+    )
+    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_TABLES}")
+    parser.add_argument("-o", "--output", metavar="TABLE", required=True, help=_TABLES)
+    parser.add_argument(
+        "--flatteners", metavar="A,B,...", default="all", help="which ones (default all)"
+    )
+    _add_columns(parser)
+
+
+def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands,
+        "quality",
+        "measure an unfolding: NMD, epsilon, distance ratios, aligned RMS",
+        common,
+        "Rows of the files belong together one by one. Columns unfolded_x/y/z of UNFOLDED and\n"
+        "true_x/y/z of W are taken first where they exist.",
+    )
+    parser.add_argument("folded", metavar="FOLDED", help=_TABLES)
+    parser.add_argument("unfolded", metavar="UNFOLDED", help="the same points, unfolded")
+    parser.add_argument("--truth", metavar="W", help="the same points, as they truly lay")
+    parser.add_argument("--columns", metavar="A,B,C", help="coordinate columns of FOLDED")
+    parser.add_argument("--unfolded-columns", metavar="A,B,C", help="those of UNFOLDED")
+    parser.add_argument("--truth-columns", metavar="A,B,C", help="those of W")
+    parser.add_argument("--neighbours", metavar="K", help="per point (default 26)")
+    parser.add_argument("-o", "--output", metavar="F.json", help="the figures as JSON")
+
+
+def _add_simulate(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands, "simulate", "make a simulated folded body with its exact truth", common
+    )
+    parser.add_argument("case", metavar="CASE", nargs="?", help="which one")
+    parser.add_argument("--list", action="store_true", help="list the cases")
+    parser.add_argument("-o", "--output", metavar="OUT", help=_TABLES)
+
+
+def _add_view(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands, "view", "draw points, folded or unfolded, into a picture", common
+    )
+    parser.add_argument("points", metavar="POINTS", help=_TABLES)
+    parser.add_argument("-o", "--output", metavar="PICTURE.png", required=True)
+    parser.add_argument("--colour", metavar="COLUMN", help="colour by a column of numbers")
+    _add_columns(parser)

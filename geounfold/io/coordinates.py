@@ -1,0 +1,207 @@
+"""Which columns hold the coordinates, and their values as numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError, OptionError
+from geounfold.io._text import counted, listing, shown
+from geounfold.mesh import Floats
+
+Triple = tuple[str, str, str]
+
+LARGEST_COORDINATE = 1e15
+"""Beyond this, neighbouring doubles lie 0.125 or more apart: no block can be told from the next."""
+
+# Spelled without case, spaces, underscores and units: "X_Centre (m)" is xcentre.
+_PATTERNS = (
+    "centroid{}",
+    "{}centroid",
+    "{}",
+    "{}c",
+    "{}centre",
+    "{}center",
+    "centre{}",
+    "center{}",
+    "mid{}",
+    "{}mid",
+    "{}coord",
+    "coord{}",
+    "{}world",
+    "world{}",
+)
+_NAMED = (("easting", "northing", "elevation"), ("east", "north", "elevation"))
+_FAMILIES: tuple[Triple, ...] = (
+    *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
+    *_NAMED,
+)
+# Looked for only where none of the above is complete: x, y, z beside elevation is no question.
+_MIXED: tuple[Triple, ...] = tuple(
+    (a, b, c)
+    for a, b in (("easting", "northing"), ("east", "north"), ("x", "y"), ("e", "n"))
+    for c in ("elevation", "elev", "rl", "z", "altitude", "level")
+    if (a, b, c) not in _FAMILIES
+)
+
+_NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
+_DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. ']?\d{3})*,\d+|[+-]?\d+,\d+")
+_MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
+
+
+def _plain(name: object) -> str:
+    """Return a column name without case, unit in brackets, spaces and underscores."""
+    bare = re.sub(r"[(\[][^)\]]*[)\]]\s*$", "", str(name))
+    return re.sub(r"[\s_\-.]+", "", bare).casefold()
+
+
+def parse_columns(text: str) -> Triple:
+    """Return the three names of a ``a,b,c`` option, in which quotes protect commas.
+
+    Raises
+    ------
+    OptionError
+        When these are not three different names.
+    """
+    names = [name.strip() for name in next(csv.reader([text], skipinitialspace=True), [])]
+    if len(names) != 3 or len(set(names)) != 3 or not all(names):
+        raise OptionError(
+            f"--columns needs three different column names such as XC,YC,ZC, not '{shown(text)}'"
+        )
+    return names[0], names[1], names[2]
+
+
+def coordinate_columns(
+    names: Sequence[str], columns: Triple | None = None, *, source: str = "the table"
+) -> tuple[int, int, int]:
+    """Return the positions of the three coordinate columns.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The table's column names.
+    columns : three str, optional
+        Their names. Without them: centroid_x/y/z, x/y/z, XC/YC/ZC, xcentre/ycentre/zcentre,
+        easting/northing/elevation and the like, in any letter case.
+    source : str, optional
+        Begins the messages: the file's name.
+
+    Raises
+    ------
+    InputError
+        No complete set, more than one, or a name that is there twice.
+
+    Examples
+    --------
+    >>> coordinate_columns(["IJK", "XC", "YC", "ZC", "XINC"])
+    (1, 2, 3)
+    """
+    if columns is not None:
+        a, b, c = (_position(names, name, source) for name in columns)
+        if len({a, b, c}) != 3:
+            raise InputError(f"{source}: the columns {listing(columns)} are not three columns")
+        return a, b, c
+    plain = [_plain(name) for name in names]
+    for tier in (_FAMILIES, _MIXED):
+        found = [family for family in tier if set(family) <= set(plain)]
+        if found:
+            return _only(found, names, plain, source)
+    hint = "the first row must name the columns" if _all_numbers(names) else "name them by"
+    tail = "" if _all_numbers(names) else " --columns a,b,c"
+    raise InputError(
+        f"{source}: no coordinate columns (such as x, y, z or centroid_x, centroid_y, "
+        f"centroid_z) found; the file has: {listing(names)}; {hint}{tail}"
+    )
+
+
+def _all_numbers(names: Sequence[str]) -> bool:
+    return all(re.fullmatch(_NUMBER, str(n).strip(), re.IGNORECASE) for n in names)
+
+
+def _position(names: Sequence[str], wanted: str, source: str) -> int:
+    """Return where a named column is: the exact name first, else in any letter case."""
+    for same in (str.__eq__, lambda a, b: a.strip().casefold() == b.strip().casefold()):
+        found = [i for i, name in enumerate(names) if same(str(name), wanted)]
+        if len(found) > 1:
+            raise InputError(
+                f"{source}: the column '{shown(wanted)}' is ambiguous: it is there "
+                f"{len(found)} times ({listing(names[i] for i in found)}); rename all but one"
+            )
+        if found:
+            return found[0]
+    raise InputError(f"{source}: no column '{shown(wanted)}' found; the file has: {listing(names)}")
+
+
+def _only(
+    found: list[Triple], names: Sequence[str], plain: list[str], source: str
+) -> tuple[int, int, int]:
+    """Return the one set found, or an error naming all candidates."""
+    if len(found) > 1:
+        sets = " and ".join(
+            "/".join(shown(names[plain.index(axis)]) for axis in family) for family in found
+        )
+        raise InputError(f"{source}: ambiguous coordinate columns {sets}; choose by --columns")
+    for axis in found[0]:
+        twice = [names[i] for i, name in enumerate(plain) if name == axis]
+        if len(twice) > 1:
+            raise InputError(
+                f"{source}: ambiguous coordinate columns, several are called alike: "
+                f"{listing(twice)}; choose by --columns, or rename all but one"
+            )
+    a, b, c = (plain.index(axis) for axis in found[0])
+    return a, b, c
+
+
+def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
+    """Return a column's values, (n,) float; missing ones are NaN.
+
+    Raises
+    ------
+    InputError
+        A value is not a number: the first one is named with its row.
+    """
+    name = shown(column.name)
+    kind = column.dtype
+    if pd.api.types.is_bool_dtype(kind) or pd.api.types.is_datetime64_any_dtype(kind):
+        raise InputError(f"{source}: column '{name}' is not numeric: it holds {kind}")
+    if pd.api.types.is_numeric_dtype(kind):
+        return np.asarray(column.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
+    text = column.to_numpy(dtype=object, na_value="")
+    try:
+        values = text.astype(np.float64)
+    except (TypeError, ValueError):
+        return _with_gaps(text, name, source)
+    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000, no other tool does
+        return _with_gaps(text, name, source)
+    return np.asarray(values, dtype=np.float64)
+
+
+def _with_gaps(text: np.ndarray, name: str, source: str) -> Floats:
+    """Return numbers where some values are missing, or an error naming what is no number."""
+    words = pd.Series(text, dtype=object).astype(str).str.strip()
+    missing = words.str.casefold().isin(_MISSING).to_numpy()
+    good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
+    bad = np.flatnonzero(~missing & ~good)
+    if len(bad):
+        first = words.iloc[bad[0]]
+        others = f" ({counted(len(bad), 'such value')})" if len(bad) > 1 else ""
+        raise InputError(
+            f"{source}: column '{name}' is not numeric: data row {bad[0] + 1} has "
+            f"'{shown(first)}'{others}{_hint(first)}"
+        )
+    values = np.full(len(words), np.nan)
+    values[~missing] = words.to_numpy(dtype=object)[~missing].astype(np.float64)
+    return values
+
+
+def _hint(word: str) -> str:
+    """Return what to do about a number in another country's notation."""
+    if "," in word and _DECIMAL_COMMA.fullmatch(word):
+        return "; write decimals with a point, not a comma"
+    if re.fullmatch(r"[+-]?\d{1,3}(?:[, ']\d{3})+(?:\.\d+)?", word):
+        return "; write numbers without thousands separators"
+    return ""

@@ -1,0 +1,239 @@
+"""Outputs that appear whole or not at all, and never in place of what must be kept.
+
+All outputs of a run are checked before anything is computed. They are written into a hidden
+folder beside each target and moved in place together once every one is complete.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from geounfold.errors import OutputError
+from geounfold.io._text import shown
+from geounfold.io.tables import ending
+
+_PREFIX, _SUFFIX = ".geounfold-", ".part"
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The files that a run will write, checked.
+
+    Attributes
+    ----------
+    paths : dict of Path
+        Absolute targets by the name of the option that asked for each.
+    overwrite : bool
+        Whether existing files may be replaced.
+    """
+
+    paths: Mapping[str, Path]
+    overwrite: bool = False
+
+    @classmethod
+    def planned(
+        cls,
+        wanted: Mapping[str, tuple[str | Path | None, tuple[str, ...]]],
+        inputs: Iterable[str | Path] = (),
+        *,
+        overwrite: bool = False,
+    ) -> Outputs:
+        """Return the outputs of a run after checking all of them; nothing is left on disk.
+
+        Parameters
+        ----------
+        wanted : dict of (path or None, valid endings)
+            By the name of the option; None for an output that is not asked for, no endings for
+            one that may have any.
+        inputs : paths, optional
+            The run's inputs, none of which may be an output.
+        overwrite : bool, optional
+            Whether existing files may be replaced.
+
+        Raises
+        ------
+        OutputError
+            A folder is missing or cannot be written, a file exists already and may not be
+            replaced, a target is a directory, an input, or asked for twice, or has an
+            unknown ending.
+        """
+        targets = {
+            name: _target(name, Path(path), endings)
+            for name, (path, endings) in wanted.items()
+            if path is not None
+        }
+        sources = [Path(p).resolve() for p in inputs]
+        for name, target in targets.items():
+            twin = next((n for n in targets if n != name and _same(targets[n], target)), None)
+            if twin is not None:
+                raise OutputError(f"{target}: {name} and {twin} name the same file")
+            if any(_same(target, source) for source in sources):
+                raise OutputError(f"{target}: {name} is also an input; choose another file")
+            _check_replaceable(target, overwrite)
+        for folder in {target.parent for target in targets.values()}:
+            _check_writable(folder)
+        return cls(targets, overwrite)
+
+    @contextmanager
+    def writing(self) -> Iterator[dict[str, Path]]:
+        """Yield a path to write each output to; on leaving, all of them appear, or none.
+
+        Whatever ends the block early (an error, an interrupt) leaves every target as it was.
+
+        Raises
+        ------
+        OutputError
+            The disk is full, or a target has appeared meanwhile and may not be replaced.
+        """
+        folders: dict[Path, Path] = {}
+        try:
+            with _as_output_error(self.paths.values()):
+                for folder in sorted({target.parent for target in self.paths.values()}):
+                    folders[folder] = Path(tempfile.mkdtemp(_SUFFIX, _PREFIX, folder))
+                parts = {n: folders[t.parent] / t.name for n, t in self.paths.items()}
+                yield dict(parts)
+                for part in parts.values():
+                    _flush(part)
+                self._publish(parts)
+                for folder in folders:
+                    _flush(folder)
+        finally:
+            for part_folder in folders.values():
+                shutil.rmtree(part_folder, ignore_errors=True)
+
+    def _publish(self, parts: Mapping[str, Path]) -> None:
+        """Move all complete files in place; take back the new ones when one cannot be."""
+        new: list[Path] = []
+        try:
+            for name, part in parts.items():
+                target = self.paths[name]
+                if self.overwrite and target.exists():
+                    shutil.copymode(target, part)
+                    os.replace(part, target)  # noqa: PTH105
+                else:
+                    _move_new(part, target)
+                    new.append(target)
+        except BaseException:
+            for target in new:
+                target.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a path to write to; the file appears at `path` once the block has ended well.
+
+    Raises
+    ------
+    OutputError
+        As `Outputs.planned` and `Outputs.writing`.
+    """
+    outputs = Outputs.planned({"the output": (path, ())}, overwrite=overwrite)
+    with outputs.writing() as parts:
+        yield parts["the output"]
+
+
+def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
+    """Return where a link leads, with a valid ending."""
+    try:
+        target = path.resolve()
+        is_folder = target.is_dir()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise OutputError(f"{name}: '{shown(path)}' is no path: {error}") from error
+    if is_folder:
+        raise OutputError(f"{path}: {name} is a directory, not a file")
+    if endings and ending(path) not in endings:
+        raise OutputError(f"{path}: {name} must end in {' or '.join(endings)}")
+    return target
+
+
+def _same(a: Path, b: Path) -> bool:
+    """Return whether two paths lead to one file (hard links included)."""
+    if a == b:
+        return True
+    try:
+        return a.samefile(b)
+    except OSError:
+        return False
+
+
+def _check_replaceable(target: Path, overwrite: bool) -> None:
+    """Raise where a target is there already and may not be replaced."""
+    if not os.path.lexists(target):
+        return
+    if not target.is_file():
+        raise OutputError(f"{target}: exists and is not a regular file")
+    if not overwrite:
+        raise OutputError(f"{target}: the file exists already; --overwrite replaces it")
+
+
+def _check_writable(folder: Path) -> None:
+    """Raise where no file can be made in a folder, by making one."""
+    if not folder.exists():
+        raise OutputError(f"{folder}: no such folder; make it first")
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: is a file, not a folder")
+    try:
+        Path(tempfile.mkdtemp(_SUFFIX, _PREFIX, folder)).rmdir()
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: the folder cannot be written: {error.strerror or error}"
+        ) from error
+
+
+@contextmanager
+def _as_output_error(targets: Iterable[Path]) -> Iterator[None]:
+    """Turn the system's refusals to write into one line."""
+    try:
+        yield
+    except OSError as error:
+        names = ", ".join(str(target) for target in targets)
+        raise OutputError(
+            f"cannot write {names}: {error.strerror or error}; nothing was changed"
+        ) from error
+
+
+def _flush(path: Path) -> None:
+    """Bring a file or folder onto the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # no such thing on this file system
+            raise
+    finally:
+        os.close(handle)
+
+
+def _move_new(part: Path, target: Path) -> None:
+    """Move a file in place unless something is there, with no moment between look and move."""
+    try:
+        os.link(part, target)
+    except FileExistsError as error:
+        raise OutputError(
+            f"{target}: the file has appeared meanwhile; --overwrite replaces it"
+        ) from error
+    except OSError:  # a file system without hard links: claim the name, then replace it
+        _claim(part, target)
+
+
+def _claim(part: Path, target: Path) -> None:
+    try:
+        os.close(os.open(target, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+    except FileExistsError as error:
+        raise OutputError(
+            f"{target}: the file has appeared meanwhile; --overwrite replaces it"
+        ) from error
+    try:
+        os.replace(part, target)  # noqa: PTH105
+    except BaseException:
+        with suppress(OSError):
+            target.unlink()
+        raise

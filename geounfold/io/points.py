@@ -1,0 +1,169 @@
+"""Tables of points: coordinates checked, everything else kept as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError
+from geounfold.io._text import counted, rows_named
+from geounfold.io.coordinates import LARGEST_COORDINATE, Triple, coordinate_columns, numbers
+from geounfold.io.tables import read_table, with_columns, write_table
+from geounfold.mesh import Bools, Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class PointTable:
+    """Points of a file with everything that stands beside them.
+
+    Attributes
+    ----------
+    source : str
+        The file, as it was named.
+    frame : DataFrame, n rows
+        Every column, in order; a CSV's as text (see `numbers`).
+    columns : three str
+        Names of the coordinate columns.
+    points : (n, 3) float
+        The coordinates, in the file's unit; finite.
+    dropped : (k,) int
+        The data rows left out for want of finite coordinates (1 is the first after the header).
+    text : bool
+        True where the columns are text because the file is a CSV.
+    """
+
+    source: str
+    frame: pd.DataFrame
+    columns: Triple
+    points: Floats
+    dropped: Ints
+    text: bool
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @cached_property
+    def duplicates(self) -> int:
+        """How many points repeat the coordinates of an earlier one; they are kept."""
+        return int(pd.DataFrame(self.points).duplicated().sum())
+
+    def numbers(self, column: str) -> Floats:
+        """Return any column's values, (n,) float, NaN where missing.
+
+        Raises
+        ------
+        InputError
+            No such column, two of that name, or a value that is not a number.
+        """
+        where = np.flatnonzero(self.frame.columns == column)
+        if len(where) != 1:
+            what = "no" if not len(where) else "more than one"
+            raise InputError(f"{self.source}: {what} column '{column}'")
+        return numbers(self.frame.iloc[:, int(where[0])], source=self.source)
+
+    def with_columns(self, columns: dict[str, Any]) -> pd.DataFrame:
+        """Return the frame with results added at the end, or in place of ones of the same name.
+
+        Raises
+        ------
+        InputError
+            A result would replace the coordinates themselves.
+        """
+        clash = [name for name in self.columns if name in columns]
+        if clash:
+            raise InputError(
+                f"{self.source}: the result's column '{clash[0]}' would replace the coordinates "
+                "read; rename the input's columns"
+            )
+        return with_columns(self.frame, columns)
+
+    def write(self, path: str | Path, columns: dict[str, Any]) -> None:
+        """Write the table with results added, by the path's ending."""
+        frame = self.with_columns(columns)
+        own = tuple(str(n) for n in self.frame.columns if n not in columns) if self.text else ()
+        write_table(path, frame, text=own)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what was read, for a summary."""
+        return {
+            "file": self.source,
+            "columns": list(self.columns),
+            "rows": len(self) + len(self.dropped),
+            "dropped_invalid": len(self.dropped),
+            "dropped_rows": self.dropped[:100].tolist(),
+            "duplicates": self.duplicates,
+        }
+
+
+def read_points(
+    path: str | Path,
+    columns: Triple | None = None,
+    *,
+    prefer: tuple[Triple, ...] = (),
+    drop_invalid: bool = False,
+) -> PointTable:
+    """Return the points of a ``.csv``, ``.csv.gz`` or ``.parquet`` file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    columns : three str, optional
+        Names of the coordinate columns (see `coordinate_columns` for those found without).
+    prefer : tuples of three str, optional
+        Names to take first where a table has all three, as ``unfolded_x`` ... of an output.
+    drop_invalid : bool, optional
+        Leave out rows whose coordinates are missing or infinite instead of refusing them.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, columns missing, ambiguous or not numeric, coordinates
+        missing, infinite or too large, or no rows left.
+    """
+    source = str(path)
+    table = read_table(path)
+    names = [str(name) for name in table.frame.columns]
+    if columns is None:
+        columns = next((p for p in prefer if set(p) <= set(names)), None)
+    where = coordinate_columns(names, columns, source=source)
+    axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
+    points = np.column_stack(axes)
+    valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
+    _check_size(points, valid, source)
+    dropped = np.flatnonzero(~valid) + 1
+    if len(dropped) and not drop_invalid:
+        raise _invalid(dropped, len(points), source)
+    if len(dropped) == len(points):
+        raise InputError(f"{source}: no row has finite coordinates")
+    frame = table.frame
+    if len(dropped):
+        frame, points = frame.loc[valid].reset_index(drop=True), points[valid]
+    a, b, c = (names[i] for i in where)
+    return PointTable(source, frame, (a, b, c), points, dropped, table.text)
+
+
+def _invalid(rows: Ints, total: int, source: str) -> InputError:
+    """Return the error that names the rows without finite coordinates."""
+    verb = "has" if len(rows) == 1 else "have"
+    return InputError(
+        f"{source}: {len(rows)} of {counted(total, 'row')} {verb} a missing or infinite "
+        f"coordinate: {rows_named(rows.tolist())} (counted from 1 after the header); correct "
+        "them, or go on without them by --drop-invalid"
+    )
+
+
+def _check_size(points: Floats, valid: Bools, source: str) -> None:
+    """Raise where a finite coordinate is too large for neighbours to be told apart."""
+    huge = np.flatnonzero(valid & (np.abs(points) > LARGEST_COORDINATE).any(axis=1))
+    if len(huge):
+        row = int(huge[0])
+        raise InputError(
+            f"{source}: data row {row + 1} has a coordinate beyond {LARGEST_COORDINATE:g}, where "
+            f"numbers cannot resolve a block: {points[row].tolist()}"
+        )

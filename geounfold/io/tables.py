@@ -1,0 +1,342 @@
+"""Tables in and out, by the file's ending; what is read goes out unchanged.
+
+A CSV's values stay the text they are (leading zeros, blanks and 20-digit numbers survive); only
+the columns that are asked for become numbers. Parquet columns keep their types.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError, MissingDependencyError
+from geounfold.io._text import shown
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+TABLE_ENDINGS = (".csv", ".csv.gz", ".parquet")
+_HEAD = 1 << 16
+_FOREIGN = {
+    b"PAR1": "a Parquet file: name it .parquet",
+    b"\x1f\x8b": "compressed by gzip: name it .csv.gz",
+    b"PK\x03\x04": "a zip archive, perhaps a spreadsheet: export it as CSV",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet: export it as CSV",
+    b"\xff\xfe": "in UTF-16: save it as UTF-8",
+    b"\xfe\xff": "in UTF-16: save it as UTF-8",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table as it is in its file.
+
+    Attributes
+    ----------
+    frame : DataFrame, n rows
+        Columns in the file's order under the file's names, even where two are called alike.
+    text : bool
+        True for a CSV, whose columns are all text.
+    """
+
+    frame: pd.DataFrame
+    text: bool
+
+
+def ending(path: Path) -> str:
+    """Return a file's ending in lower case; ``.csv.gz`` counts as one.
+
+    Examples
+    --------
+    >>> ending(Path("Blocks.v2.CSV.GZ"))
+    '.csv.gz'
+    """
+    name = path.name.lower()
+    return ".csv.gz" if name.endswith(".csv.gz") else Path(name).suffix
+
+
+def existing_file(path: Path) -> Path:
+    """Return the path of a file that can be read and is not empty.
+
+    Raises
+    ------
+    InputError
+        No such file, a directory, not readable, or empty.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a directory, not a file")
+        if not path.exists():
+            raise InputError(f"{path}: no such file")
+        with path.open("rb") as stream:
+            if not stream.read(1):
+                raise InputError(f"{path}: the file is empty")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{shown(path)}: cannot be read: {reason}") from error
+    return path
+
+
+def read_table(path: str | Path) -> Table:
+    """Return the table in a ``.csv``, ``.csv.gz`` or ``.parquet`` file.
+
+    A CSV is UTF-8 (with or without a byte-order mark), its first row names the columns, and
+    commas, semicolons or tabs separate them (found from the first row).
+
+    Raises
+    ------
+    InputError
+        The file is missing, empty, a directory, no table, damaged, or holds no rows.
+    MissingDependencyError
+        A Parquet file without pyarrow installed.
+    """
+    path = Path(path)
+    kind = ending(path)
+    existing_file(path)
+    if kind not in TABLE_ENDINGS:
+        raise InputError(
+            f"{path}: unknown kind of table '{kind}'; files end in {', '.join(TABLE_ENDINGS)}"
+        )
+    table = _read_parquet(path) if kind == ".parquet" else _read_csv(path)
+    if not len(table.frame):
+        raise InputError(f"{path}: the table has a header but no rows")
+    return table
+
+
+@contextmanager
+def _as_input_error(path: Path) -> Iterator[None]:
+    """Turn what readers raise on a damaged file into one line."""
+    try:
+        yield
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not a table in UTF-8; save it as UTF-8") from error
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise InputError(f"{path}: the compressed file is damaged: {error}") from error
+    except (csv.Error, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+        words = str(error).removeprefix("Error tokenizing data. C error: ").strip()
+        raise InputError(f"{path}: is not a well-formed table: {words}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _read_csv(path: Path) -> Table:
+    """Return a CSV's columns as text."""
+    with _as_input_error(path):
+        names, separator, skip = _csv_header(path)
+        try:
+            frame = pd.read_csv(
+                path,
+                sep=separator,
+                header=None,
+                names=range(len(names)),
+                skiprows=skip,
+                dtype=str,
+                na_filter=False,
+                encoding="utf-8-sig",
+            )
+        except pd.errors.EmptyDataError:
+            frame = pd.DataFrame(columns=range(len(names)), dtype=str)
+    if not isinstance(frame.index, pd.RangeIndex):
+        more = frame.index.nlevels + len(names)
+        raise InputError(
+            f"{path}: is not a well-formed table: the first row names {len(names)} columns, "
+            f"but rows have up to {more} values"
+        )
+    frame = frame.fillna("")  # the fields that a short row lacks
+    frame.columns = pd.Index(names, dtype=object)
+    return Table(frame, text=True)
+
+
+def _csv_header(path: Path) -> tuple[list[str], str, int]:
+    """Return a CSV's column names, its separator, and the lines down to the header's end."""
+    opened = gzip.open if ending(path) == ".csv.gz" else open
+    with opened(path, "rb") as stream:
+        head = stream.read(_HEAD)
+    for magic, what in _FOREIGN.items():
+        if head.startswith(magic):
+            raise InputError(f"{path}: is not a CSV table but {what}")
+    if b"\0" in head:
+        raise InputError(f"{path}: is not a table: it holds binary data")
+    end = max(head.rfind(b"\n"), head.rfind(b"\r"))  # no half character at the end
+    text = (head[: end + 1] if len(head) == _HEAD and end >= 0 else head).decode("utf-8-sig")
+    lines = io.StringIO(text, newline=None)
+    blank = 0
+    for line in lines:
+        if line.strip():
+            break
+        blank += 1
+    else:
+        raise InputError(f"{path}: the file is empty")
+    bare = "".join(line.split('"')[::2])  # what stands outside quotes
+    separator = max(",;\t", key=bare.count)
+    return [n.strip() for n in next(csv.reader([line], delimiter=separator))], separator, blank + 1
+
+
+def _pyarrow() -> ModuleType:
+    try:
+        import pyarrow.parquet
+    except ImportError as error:
+        raise MissingDependencyError(
+            "Parquet files need pyarrow: pip install 'geounfold[parquet]'"
+        ) from error
+    module: ModuleType = pyarrow
+    return module
+
+
+def _read_parquet(path: Path) -> Table:
+    """Return a Parquet file's physical columns in their own types."""
+    pyarrow = _pyarrow()
+    try:
+        arrow = pyarrow.parquet.ParquetFile(path).read()
+        frame = arrow.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
+    except (pyarrow.ArrowException, OSError) as error:
+        words = shown(" ".join(str(error).split()))
+        raise InputError(f"{path}: is not a Parquet table, or is damaged: {words}") from error
+    return Table(frame, text=False)
+
+
+def with_columns(frame: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
+    """Return the frame with columns added at its end; one of the same name is replaced in place.
+
+    Where several columns bear the name, the first is replaced and the others are dropped, so
+    that no name of ours is there twice.
+    """
+    series: list[Any] = []
+    names: list[str] = []
+    for i, name in enumerate(frame.columns):
+        if name not in columns:
+            series.append(frame.iloc[:, i])
+        elif name not in names:
+            series.append(pd.Series(columns[name], index=frame.index))
+        else:
+            continue
+        names.append(name)
+    for name in columns:
+        if name not in names:
+            series.append(pd.Series(columns[name], index=frame.index))
+            names.append(name)
+    out: pd.DataFrame = pd.concat(series, axis=1)
+    out.columns = pd.Index(names, dtype=object)
+    return out
+
+
+def write_table(path: str | Path, frame: pd.DataFrame, *, text: tuple[str, ...] = ()) -> None:
+    """Write a table by the path's ending; floats come back bit for bit.
+
+    Missing values (NaN) are empty. The frame's index is not written. The file is written in
+    place: see `replacing` for one that appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .csv, .csv.gz or .parquet.
+    frame : DataFrame
+        The table.
+    text : names of columns, optional
+        Columns that come from a CSV and whose types a Parquet file should find out: integers
+        or floats where every value is one, else text.
+
+    Raises
+    ------
+    MissingDependencyError
+        A Parquet file without pyarrow installed.
+    """
+    path = Path(path)
+    kind = ending(path)
+    if kind == ".parquet":
+        _write_parquet(path, frame, text)
+    elif kind == ".csv.gz":
+        with path.open("wb") as raw, gzip.GzipFile("", "wb", 3, raw, mtime=0) as stream:
+            stream.write(_csv_text(frame).encode("utf-8"))
+    else:
+        with path.open("w", encoding="utf-8", newline="") as plain:
+            plain.write(_csv_text(frame))
+
+
+def _csv_text(frame: pd.DataFrame) -> str:
+    """Return a frame as comma-separated lines."""
+    header = ",".join(_quoted([str(name) for name in frame.columns]))
+    columns = [_fields(frame.iloc[:, i]) for i in range(frame.shape[1])]
+    if len(columns) == 1:  # a blank line would be no row
+        columns = [[field or '""' for field in columns[0]]]
+    return "\n".join([header, *map(",".join, zip(*columns, strict=True)), ""])
+
+
+def _fields(column: pd.Series) -> list[str]:
+    """Return a column's values as CSV fields."""
+    values = column.to_numpy(dtype=object, na_value="").tolist()
+    if pd.api.types.is_float_dtype(column.dtype):
+        return ["" if v == "" or v != v else repr(v) for v in values]  # NaN equals nothing
+    return _quoted([str(v) for v in values])
+
+
+def _quoted(fields: list[str]) -> list[str]:
+    """Return fields in quotes where their text needs them."""
+    blob = "".join(fields)
+    if not any(sign in blob for sign in ',"\n\r'):
+        return fields
+    special = set(',"\n\r')
+    return ['"' + f.replace('"', '""') + '"' if special & set(f) else f for f in fields]
+
+
+def _write_parquet(path: Path, frame: pd.DataFrame, text: tuple[str, ...]) -> None:
+    """Write a frame's columns as they are, those from a CSV in the types they show."""
+    pyarrow = _pyarrow()
+    arrays = [
+        pyarrow.array(_typed(column) if name in text else column, from_pandas=True)
+        for name, column in ((n, frame.iloc[:, i]) for i, n in enumerate(frame.columns))
+    ]
+    names = [str(name) for name in frame.columns]
+    pyarrow.parquet.write_table(pyarrow.Table.from_arrays(arrays, names=names), path)
+
+
+def _typed(column: pd.Series) -> pd.Series:
+    """Return text as integers or floats where that loses nothing, blanks as missing."""
+    words = pd.Series(column.to_numpy(dtype=object), dtype=object).astype(str)
+    blank = (words == "").to_numpy()
+    filled = words[~blank]
+    if not len(filled):
+        return column
+    if filled.str.fullmatch(r"0|-?[1-9]\d{0,17}").all():
+        integers = pd.Series(pd.array([0] * len(words), dtype="Int64"))
+        integers[~blank] = filled.astype(np.int64)
+        integers[blank] = pd.NA
+        return integers
+    if filled.str.fullmatch(r"[+-]?(?:0|[1-9]\d*)?\.?\d*(?:[eE][+-]?\d+)?").all():
+        try:
+            return words.where(~blank, "nan").astype(np.float64)
+        except ValueError:  # a lone sign or point
+            return column
+    return column
+
+
+def write_json(path: str | Path, content: dict[str, Any]) -> None:
+    """Write figures as JSON; what is not finite becomes null, as JSON has no word for it."""
+    text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Return a value in JSON's own types."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    if value is None or isinstance(value, str | int | bool):
+        return value
+    return str(value)

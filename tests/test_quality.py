@@ -1,0 +1,218 @@
+"""Figures of quality on clouds whose answer is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from geounfold.control import ControlMesh
+from geounfold.errors import InputError
+from geounfold.mesh import TetMesh
+from geounfold.quality import (
+    Statistics,
+    aligned_rms,
+    assess,
+    block_quality,
+    compare_with_truth,
+    distance_ratios,
+    epsilon,
+    neighbours,
+    nmd,
+    random_pairs,
+    spacing_ratios,
+)
+
+# Sums of 26 square roots of numbers near 1: a few units in the last place.
+ROUNDING = 1e-12
+
+GRID = np.stack(np.meshgrid(*[np.arange(float(n)) for n in (9, 8, 7)], indexing="ij"), -1)
+GRID = GRID.reshape(-1, 3)
+INSIDE = ((GRID > 0) & (GRID < GRID.max(axis=0))).all(axis=1)
+
+ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # proper, exact
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+CASE = SHARED / "acceptance" / "cases" / "sim_case_1.csv"
+
+
+def arch(P, radius=8.0):
+    """Bend the slab P around a cylinder along y: lengths at z = 0 are kept."""
+    theta, r = P[:, 0] / radius, radius + P[:, 2]
+    return np.stack([r * np.sin(theta), P[:, 1], r * np.cos(theta) - radius], axis=1)
+
+
+# --- neighbours and their mean distance
+
+
+def test_a_block_inside_a_lattice_has_the_26_around_it():
+    ids = neighbours(GRID)
+    steps = np.abs(GRID[ids[INSIDE]] - GRID[INSIDE][:, None])
+    assert steps.max() == 1
+    assert steps.any(axis=2).all()  # never itself
+    # 6 faces, 12 edges, 8 corners.
+    expected = (6 + 12 * np.sqrt(2) + 8 * np.sqrt(3)) / 26
+    assert_allclose(nmd(GRID, ids)[INSIDE], expected, rtol=ROUNDING)
+
+
+def test_neighbours_agree_with_brute_force_and_ignore_chunks(monkeypatch):
+    P = np.random.default_rng(3).random((500, 3))
+    distance = np.linalg.norm(P[:, None] - P, axis=2)
+    brute = np.argsort(distance, axis=1)[:, 1:8]
+    assert_array_equal(neighbours(P, 7), brute)
+    whole = nmd(P, brute)
+    assert_allclose(whole, np.take_along_axis(distance, brute, 1).mean(axis=1), rtol=ROUNDING)
+    monkeypatch.setattr("geounfold.quality._CHUNK", 64)
+    monkeypatch.setattr("geounfold.quality._CACHED", 33)
+    assert_array_equal(neighbours(P, 7), brute)
+    assert_array_equal(nmd(P, brute), whole)
+
+
+def test_coincident_points_are_never_their_own_neighbours():
+    P = np.repeat(np.arange(4.0)[:, None] * [1, 0, 0], 5, axis=0)
+    for k in (2, 6):  # fewer and more than the four twins
+        ids = neighbours(P, k)
+        assert (ids != np.arange(len(P))[:, None]).all()
+        assert all(len(set(row)) == k for row in ids.tolist())
+
+
+@pytest.mark.parametrize("mode", ["reference", "own"])
+def test_epsilon_of_a_moved_body_is_zero_and_of_a_scaled_one_the_scale(mode):
+    P = np.random.default_rng(4).random((300, 3))
+    assert_allclose(epsilon(P, P @ ROTATION + 9, mode=mode), 0, atol=1e3 * ROUNDING)
+    assert_allclose(epsilon(P, 1.25 * P, mode=mode), 0.25, rtol=ROUNDING)
+    assert_allclose(epsilon(P, 0.75 * P, mode=mode), 0.25, rtol=ROUNDING)
+
+
+def test_a_shuffled_cloud_is_seen_by_the_references_neighbours_only():
+    P = np.random.default_rng(5).random((300, 3))
+    shuffled = P[np.random.default_rng(6).permutation(len(P))]
+    # Neighbours 0.24 apart land anywhere in the unit cube, 0.66 apart: measured 1.82; each cloud's
+    # own neighbours compare two unrelated mean distances: measured 0.17.
+    assert epsilon(P, shuffled).mean() > 1.5
+    assert epsilon(P, shuffled, mode="own").mean() < 0.3
+
+
+# --- against a truth
+
+
+def test_alignment_undoes_rigid_motion_but_no_mirror():
+    assert aligned_rms(GRID @ ROTATION + [1e5, 2e6, 30], GRID) < 1e-8  # 2e6 times 1e-16, summed
+    mirrored = aligned_rms(GRID * [1, 1, -1], GRID)
+    # The best a rotation can do is to undo the mirror along x or y and leave z: twice its spread.
+    assert mirrored == pytest.approx(2 * GRID[:, 2].std(), rel=1e-9)
+
+
+def test_spacings_along_the_truths_axes_however_the_answer_is_turned():
+    Y = GRID * [1.1, 0.9, 1.3] @ ROTATION
+    assert_allclose(spacing_ratios(Y, GRID), [1.1, 0.9, 1.3], rtol=1e-9)
+    sheet = GRID[GRID[:, 2] == 0]
+    assert spacing_ratios(sheet, sheet) == (1.0, 1.0, None)
+
+
+def test_far_distances_see_a_fold_that_near_ones_hide():
+    slab = GRID * [1, 1, 0.1] - [0, 0, 0.3]
+    folded = arch(slab, radius=3.0)
+    near = np.stack([np.repeat(np.arange(len(slab)), 4), neighbours(slab, 4).ravel()], axis=1)
+    far = random_pairs(len(slab), 5000)
+    # Measured means of |ratio - 1|: 2e-15 near (all across the layer), 0.050 far.
+    assert np.abs(distance_ratios(slab, folded, near) - 1).mean() < 1e-9
+    assert np.abs(distance_ratios(slab, folded, far) - 1).mean() > 0.02
+
+
+def test_pairs_are_different_and_repeatable():
+    pairs = random_pairs(3, 1000)
+    assert (pairs[:, 0] != pairs[:, 1]).all()
+    assert set(pairs.ravel()) == {0, 1, 2}
+    assert_array_equal(pairs, random_pairs(3, 1000))
+
+
+def test_comparison_shows_what_doing_nothing_scores():
+    folded = arch(GRID)
+    same = compare_with_truth(folded, GRID, GRID)
+    assert same.epsilon_truth.max == same.rms == same.distances.max == 0
+    nothing = compare_with_truth(folded, folded, GRID)
+    assert nothing.epsilon_folded.max == 0
+    assert nothing.epsilon_truth == nothing.epsilon_nothing == same.epsilon_nothing
+    assert nothing.rms == nothing.rms_nothing == same.rms_nothing > 0.5
+    assert set(same.summary()["epsilon_truth"]) == {"mean", "std", "p95", "max"}
+
+
+@pytest.mark.skipif(not CASE.exists(), reason=f"no acceptance body at {CASE}")
+def test_doing_nothing_scores_what_the_literature_case_says():
+    table = np.loadtxt(CASE, delimiter=",", skiprows=1)
+    # An independent script (its own tree and mean) gives 0.01719.
+    assert epsilon(table[:, 3:6], table[:, :3]).mean() == pytest.approx(0.01719, abs=5e-6)
+
+
+# --- distortion at the blocks
+
+
+def cube_map(J):
+    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
+    tets = np.array(
+        [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]
+    )
+    mesh = TetMesh(9 * corners, tets)
+    return ControlMesh(mesh, mesh.with_vertices(mesh.V @ np.asarray(J).T), corners[:, 2])
+
+
+def test_blocks_get_the_distortion_of_the_element_that_carried_them():
+    J = np.array([[1.0, 0, 0.5], [0, 1, 0], [0, 0, 2.0]])
+    elements = np.arange(len(GRID)) % 3  # three of six elements carry blocks
+    q = assess(cube_map(J), elements, GRID, GRID @ J.T)
+    columns = q.blocks.columns()
+    assert list(columns) == ["volume_ratio", "nmd_error", "stretch_min", "stretch_max", "shear"]
+    assert all(c.shape == (len(GRID),) for c in columns.values())
+    assert_allclose(q.blocks.volume_ratio, 2.0, rtol=ROUNDING)
+    assert_allclose(q.blocks.shear, 0.25, rtol=ROUNDING)
+    assert_allclose(q.blocks.nmd_error, epsilon(GRID, GRID @ J.T))
+    assert q.volume_folded == pytest.approx(729)
+    assert q.volume_unfolded == pytest.approx(1458)
+    assert (q.inverted_folded, q.inverted_unfolded) == (0, 0)
+    assert "blocks" not in q.summary()
+    assert q.summary()["volume_change"]["mean"] == pytest.approx(1.0)
+
+
+def test_inverted_elements_are_counted_and_volumes_keep_their_sign():
+    q = assess(cube_map(np.diag([1.0, 1, -1])), np.zeros(len(GRID), int), GRID, GRID * [1, 1, -1])
+    assert (q.inverted_folded, q.inverted_unfolded) == (0, 6)
+    assert q.volume_unfolded == pytest.approx(-729)
+
+
+# --- what is refused
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: neighbours(GRID[:, :2]), r"points must have shape \(n, 3\)"),
+        (lambda: neighbours(GRID[:26]), "26 neighbours need more than 26 points"),
+        (lambda: neighbours(GRID, 0), "at least 1"),
+        (lambda: neighbours(np.where(GRID == 8, np.nan, GRID)), "row 448 is not finite"),
+        (lambda: nmd(GRID, neighbours(GRID)[1:]), "neighbours must have shape"),
+        (lambda: nmd(GRID, np.full((len(GRID), 2), len(GRID))), "neighbours name rows"),
+        (lambda: epsilon(GRID, GRID[1:]), "A and B must pair row by row"),
+        (lambda: epsilon(GRID, GRID, mode="both"), "mode must be"),
+        (lambda: epsilon(0 * GRID, GRID), "coincides with its 26 neighbours"),
+        (lambda: aligned_rms(GRID[:0], GRID[:0]), "no points to align"),
+        (lambda: aligned_rms(GRID, GRID[1:]), "Y and W must pair row by row"),
+        (lambda: random_pairs(1), "at least 2 points"),
+        (lambda: distance_ratios(GRID, GRID, np.array([[1, 1]])), "no pair of points"),
+        (lambda: Statistics.of(np.array([])), "no values"),
+        (lambda: Statistics.of(np.array([1.0, np.nan])), "1 of 2 values are not finite"),
+        (
+            lambda: block_quality(cube_map(np.eye(3)), np.zeros(3, int), GRID, GRID),
+            "elements must have shape",
+        ),
+        (
+            lambda: block_quality(cube_map(np.eye(3)), np.full(len(GRID), -1), GRID, GRID),
+            "elements name -1..-1, but there are 6",
+        ),
+    ],
+)
+def test_bad_input_is_refused_with_its_reason(call, message):
+    with pytest.raises(InputError, match=message):
+        call()

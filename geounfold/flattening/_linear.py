@@ -53,3 +53,38 @@ def pinned_solver(laplacian: sp.csc_array) -> tuple[Callable[[Floats], Floats], 
     place[1:] = lu.perm_c
     place[0] = n - 1
     return solve, place
+
+
+def preconditioned_solve(
+    matrix: sp.csc_array,
+    load: Floats,
+    precondition: Callable[[Floats], Floats],
+    tol: float = 1e-5,
+    max_iter: int = 20,
+) -> Floats | None:
+    """Return ``matrix^-1 load`` by conjugate gradients, preconditioned by an earlier factoring.
+
+    Returns
+    -------
+    (n,) float or None
+        The solution with a residual of at most ``tol`` of the load's, measured in the
+        preconditioner; None where that takes more than ``max_iter`` steps, or where the matrix
+        or the preconditioner turns out not to be positive definite.
+    """
+    x, residual = np.zeros_like(load), load.copy()
+    z = precondition(residual)
+    direction, rho = z, float(residual @ z)
+    limit = tol**2 * rho
+    for _ in range(max_iter):
+        image = matrix @ direction
+        curvature = float(direction @ image)
+        if not (rho > 0 and curvature > 0):
+            return None
+        x += (rho / curvature) * direction
+        residual -= (rho / curvature) * image
+        z = precondition(residual)
+        before, rho = rho, float(residual @ z)
+        if abs(rho) <= limit:
+            return x
+        direction = z + (rho / before) * direction
+    return None

@@ -15,6 +15,11 @@ from geounfold.mesh import Floats, Ints, TriMesh
 #: A triangle is degenerate where its area is below this share of its longest side squared.
 DEGENERATE = 1e-12
 
+NOT_MANIFOLD = (
+    "the surface is not an oriented manifold: an edge or a vertex is shared by too many faces, "
+    "or neighbouring faces face opposite ways"
+)
+
 
 def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     """Return the border loops of a disk, holes allowed: the longest (outer) loop first.
@@ -27,25 +32,36 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     """
     _check_faces(mesh)
     F, n = mesh.F, len(mesh.V)
-    sides = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    if len(np.unique(sides[:, 0] * n + sides[:, 1])) < len(sides) or not backend.is_manifold(F):
-        raise MeshError(
-            "the surface is not an oriented manifold: an edge or a vertex is shared by too many "
-            "faces, or neighbouring faces face opposite ways"
-        )
+    if not _oriented(F, n):
+        raise MeshError(NOT_MANIFOLD)
     parts = int(backend.face_components(F).max()) + 1
     if parts > 1:
         raise MeshError(f"the surface has {parts} components, flatten each one alone")
     loops = backend.boundary_loops(F)
     if not loops:
         raise MeshError("the surface is closed: it has no border, so it cannot be flattened")
-    euler = n - len(unique_edges(F)) + len(F)
-    if euler != 2 - len(loops):
-        handles = (2 - len(loops) - euler) // 2
-        raise MeshError(f"the surface has {handles} handle(s): cut it open to a disk first")
+    # With one component and simple loops, every handle takes two off Euler's number, and every
+    # vertex where fans of faces touch takes one.
+    missing = 2 - len(loops) - (n - len(unique_edges(F)) + len(F))
+    if missing and not backend.is_manifold(F):
+        raise MeshError(NOT_MANIFOLD)
+    if missing:
+        raise MeshError(f"the surface has {missing // 2} handle(s): cut it open to a disk first")
     perimeter = [float(lengths(mesh.V, _cycle(loop)).sum()) for loop in loops]
     order = sorted(range(len(loops)), key=lambda k: (-perimeter[k], k))
     return tuple(loops[k] for k in order)
+
+
+def _oriented(F: Ints, n: int) -> bool:
+    """Return whether no directed edge is used twice and no vertex lies on two borders."""
+    sides = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    key = np.sort(sides[:, 0] * n + sides[:, 1])
+    if (key[1:] == key[:-1]).any():
+        return False
+    back = sides[:, 1] * n + sides[:, 0]
+    at = np.minimum(np.searchsorted(key, back), len(key) - 1)
+    border = sides[key[at] != back, 0]
+    return int(np.bincount(border, minlength=n).max()) <= 1
 
 
 def _check_faces(mesh: TriMesh) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
 
 from geounfold.errors import FlatteningError, OptionError
 from geounfold.flattening._guard import FoldGuard
-from geounfold.flattening._linear import factor, incidence, pinned_solver
+from geounfold.flattening._linear import factor, incidence, pinned_solver, preconditioned_solve
 from geounfold.flattening._problem import History, Problem, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._rigid import RigidSteps
@@ -170,6 +172,8 @@ class _System:
         self.problem, self.guard = problem, guard
         self._pattern = BlockPattern(problem.edges, place)
         self._key = problem.edges[:, 0] * len(place) + problem.edges[:, 1]
+        self._factors: spl.SuperLU | None = None
+        self._far: int | None = None
 
     def energy(self, uv: Floats) -> float:
         """Return the energy; infinite where the barrier is broken."""
@@ -189,18 +193,30 @@ class _System:
 
     def newton_step(self, uv: Floats, force: Floats, convex: bool) -> Floats | None:
         """Return the solution of ``H s = force``, (n, 2); None where H cannot be factored."""
+        matrix, load = self._hessian(uv, convex), self._pattern.scatter(force)
+        if self._factors is not None and not convex:
+            step = preconditioned_solve(matrix, load, self._factors.solve)
+            if step is not None:
+                return self._pattern.gather(step)
+        try:
+            self._factors = factor(matrix, ordered=True)
+        except RuntimeError:  # exactly singular: the caller takes the convex Hessian
+            self._factors = None
+            return None
+        return self._pattern.gather(self._factors.solve(load))
+
+    def _hessian(self, uv: Floats, convex: bool) -> sp.csc_array:
+        """Return the second derivatives, the rigid motions held."""
         blocks = spring_blocks(uv, self.problem.edges, self.problem.rest, convex)
         vertex, edge = self._pattern.stiffness(blocks)
         if self.guard is not None:
             self._add_barrier(uv, vertex, edge)
         if convex:
             vertex[:, [0, 1], [0, 1]] += RIDGE
-        _pin(uv, vertex)
-        try:
-            lu = factor(self._pattern.matrix(vertex, edge), ordered=True)
-        except RuntimeError:  # exactly singular: the caller takes the convex Hessian
-            return None
-        return self._pattern.gather(lu.solve(self._pattern.scatter(force)))
+        if self._far is None:
+            self._far = int(np.argmax(((uv - uv[0]) ** 2).sum(axis=1)))
+        _pin(uv, vertex, self._far)
+        return self._pattern.matrix(vertex, edge)
 
     def _add_barrier(self, uv: Floats, vertex: Floats, edge: Floats) -> None:
         """Add the barrier's (Gauss-Newton) second derivatives to the blocks."""
@@ -218,9 +234,8 @@ class _System:
             np.add.at(edge, np.searchsorted(self._key, low * n + high), outer)
 
 
-def _pin(uv: Floats, vertex: Floats) -> None:
-    """Hold the three rigid motions by springs on two vertices; they carry no load."""
-    far = int(np.argmax(((uv - uv[0]) ** 2).sum(axis=1)))
+def _pin(uv: Floats, vertex: Floats, far: int) -> None:
+    """Hold the three rigid motions by springs on vertices 0 and far; they carry no load."""
     across = np.array([-1.0, 1.0]) * (uv[far] - uv[0])[::-1]
     across /= max(float(np.linalg.norm(across)), np.finfo(float).tiny)
     vertex[0] += np.eye(2)

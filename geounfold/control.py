@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geounfold.errors import OptionError
 from geounfold.geometry import tet_volumes
 from geounfold.mesh import Floats, TetMesh
 
@@ -36,3 +37,55 @@ class ControlMesh:
     def inverted_unfolded(self) -> int:
         """Number of tetrahedra whose unfolded volume is not positive."""
         return int(np.count_nonzero(tet_volumes(self.unfolded.V, self.unfolded.T) <= 0))
+
+
+DATUMS = ("mid", "top", "bottom", "proportional")
+"""Which surface is flat in the unfolded space; ``proportional``: top and bottom both."""
+
+
+def with_datum(
+    control: ControlMesh, bottom: Floats, top: Floats, weight: Floats, datum: str
+) -> ControlMesh:
+    """Return the control mesh with another surface flat.
+
+    Heights are sheared along the prisms, so ``top`` and ``bottom`` keep every volume and every
+    thickness; ``proportional`` also scales them to the mean thickness.
+
+    Parameters
+    ----------
+    control : ControlMesh
+        With the mid surface flat; vertices in layers of n.
+    bottom, top : (n,) float
+        Height of the bottom and of the top at the vertices of a layer.
+    weight : (n,) float
+        Weights of the means.
+    datum : str
+        One of DATUMS.
+
+    Raises
+    ------
+    OptionError
+        An unknown datum.
+    """
+    if datum not in DATUMS:
+        raise OptionError(f"unknown datum {datum!r}; valid: {', '.join(DATUMS)}")
+    if datum == "mid":
+        return control
+    V = np.array(control.unfolded.V)
+    if datum == "proportional":
+        thickness = float(np.average(top - bottom, weights=weight))
+        V[:, 2] = (control.stratigraphic - 0.5) * thickness
+    else:
+        surface = top if datum == "top" else bottom
+        shift = np.average(surface, weights=weight) - surface
+        V[:, 2] += np.tile(shift, len(V) // len(shift))
+    return replace(control, unfolded=control.unfolded.with_vertices(V))
+
+
+def scaled(control: ControlMesh, folded: Floats, factor: float) -> ControlMesh:
+    """Return the control mesh over other folded vertices, its unfolded ones times a factor."""
+    return ControlMesh(
+        control.folded.with_vertices(folded),
+        control.unfolded.with_vertices(control.unfolded.V * factor),
+        control.stratigraphic,
+    )

@@ -157,3 +157,10 @@ def border_vertices(F: Ints, n: int) -> Bools:
     for loop in boundary_loops(F):
         out[loop] = True
     return out
+
+
+def pinched_vertices(F: Ints) -> Ints:
+    """Return the vertices where two fans of triangles meet in nothing but the vertex."""
+    manifold = igl.is_vertex_manifold(_i(F))
+    flags = np.asarray(manifold[1] if isinstance(manifold, tuple) else manifold)
+    return np.setdiff1d(np.flatnonzero(~flags.ravel()), np.setdiff1d(np.arange(len(flags)), F))

@@ -9,16 +9,17 @@ import numpy as np
 
 from geounfold.backends.igl import TetIndex
 from geounfold.control import ControlMesh
+from geounfold.flattening._result import Flattening
 from geounfold.geometry import lengths, unique_edges
-from geounfold.mesh import Bools, Floats, Ints, TetMesh, TriMesh
+from geounfold.mesh import Floats, Ints, TetMesh, TriMesh
 from geounfold.sheet.fit import FittedSheet
 from geounfold.sheet.footprint import Footprint, footprint, principal_direction
 from geounfold.sheet.horizons import Horizons
 from geounfold.sheet.layers import FRACTIONS, Layers, bad_nodes, neighbour_mean, shrink
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
-Flatten = Callable[[TriMesh, Floats | None, Floats | None], Floats]
-"""``flatten(mesh, start, rest)`` -> uv (n, 2); ``rest`` are lengths of ``unique_edges(F)``."""
+Flatten = Callable[[TriMesh, Floats | None, Floats | None], Flattening]
+"""``flatten(mesh, start, rest)``; ``rest`` are the lengths of ``unique_edges(F)``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,7 @@ class ControlOptions:
     pad: float = 0.6
     pad_capped: float = 1.0
     focal: float = 0.9
+    slope: float = 0.7
     reach: int = 3
     shrinks: int = 40
     trip: float = 1e-6
@@ -50,12 +52,13 @@ class SheetMesh:
     ----------
     control : ControlMesh
         Tetrahedra in both spaces.
-    mid : TriMesh
-        The folded mid surface over the footprint.
-    mid_flat : (n, 2) float
-        The same vertices laid flat.
+    flattenings : dict of Flattening
+        The mid surface (``mid``) and the parallel surfaces above and below it (``top``,
+        ``bottom``), over the same footprint, as they were flattened.
     heights : (2, n) float
-        Bottom's and top's signed offset at those vertices.
+        Bottom's and top's signed offset at the footprint's nodes.
+    weight : (n,) float
+        Blocks around each node.
     layers : Layers
         The prisms.
     rung : str
@@ -65,9 +68,9 @@ class SheetMesh:
     """
 
     control: ControlMesh
-    mid: TriMesh
-    mid_flat: Floats
+    flattenings: dict[str, Flattening]
     heights: Floats
+    weight: Floats
     layers: Layers
     rung: str
     shrinks: int
@@ -82,7 +85,8 @@ def arc_lengths(V: Floats, normal: Floats, F: Ints) -> Floats:
     E = unique_edges(F)
     half = np.arcsin(np.clip(np.linalg.norm(normal[E[:, 0]] - normal[E[:, 1]], axis=1) / 2, 0, 1))
     stretch = np.divide(half, np.sin(half), out=np.ones_like(half), where=half > 1e-9)
-    return lengths(V, E) * stretch
+    out: Floats = lengths(V, E) * stretch
+    return out
 
 
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
@@ -106,23 +110,55 @@ def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
     return foot
 
 
-def _flat_layers(
-    sheet: Sheet, prints: Footprint, c: tuple[float, float], flatten: Flatten
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return P, normals, flat mid and the slopes above and below, all at the nodes."""
+@dataclass(frozen=True, eq=False)
+class _FlatSheet:
+    """The mid surface at the footprint's nodes, flat, with slopes above and below."""
+
+    P: Floats
+    normal: Floats
+    flat: Floats
+    slopes: tuple[Floats, Floats]
+    flattenings: dict[str, Flattening]
+
+    @property
+    def flips(self) -> int:
+        return sum(f.flips for f in self.flattenings.values())
+
+
+def _flatten_sheet(
+    sheet: Sheet, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+) -> _FlatSheet:
+    """Flatten the mid surface and the parallel surfaces ``reach`` above and below it."""
     jet = sheet.jet(prints.U)
     P, normal = jet.value, normals(jet)
 
-    def flat(V: Floats, start: Floats) -> Floats:
+    def flat(V: Floats, start: Floats) -> Flattening:
         return flatten(TriMesh(V, prints.F), start, arc_lengths(V, normal, prints.F))
 
-    mid = flat(P, prints.U)
-    mid = register(mid, prints.U, prints.weight)
-    slopes = [
-        (register(flat(P + s * q * normal, mid), mid, prints.weight) - mid) / q
-        for s, q in zip((1.0, -1.0), c, strict=True)
-    ]
-    return P, normal, mid, slopes[0], slopes[1]
+    middle = flat(P, prints.U)
+    mid = register(middle.uv, prints.U, prints.weight)
+    above = flat(P + reach[0] * normal, mid)
+    below = flat(P - reach[1] * normal, mid)
+    slopes = tuple(
+        (register(f.uv, mid, prints.weight) - mid) / q
+        for f, q in zip((above, below), reach, strict=True)
+    )
+    flattenings = {"mid": middle, "top": above, "bottom": below}
+    return _FlatSheet(P, normal, mid, (slopes[0], slopes[1]), flattenings)
+
+
+def _safely_flat(
+    sheet: Sheet, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+) -> _FlatSheet:
+    """Flatten at the full reach, or nearer to the mid surface where that would fold over.
+
+    Slip is linear in height on a developable sheet, so nearer surfaces give the same slopes.
+    """
+    for share in (1.0, 0.6, 0.35, 0.2):
+        result = _flatten_sheet(sheet, prints, (share * reach[0], share * reach[1]), flatten)
+        if not result.flips:
+            break
+    return result
 
 
 def _focal_caps(curvature: Floats, focal: float) -> Floats:
@@ -211,16 +247,26 @@ def build_control(
     use = foot.miss < 0.5
     reach = float(np.abs(foot.t[use]).max()) + options.pad
     constant = not (caps < reach).any()
-    safe = [reach if constant else min(reach, float(np.percentile(c, 0.5))) for c in caps]
-    P, normal, flat, above, below = _flat_layers(sheet, prints, (safe[0], safe[1]), flatten)
+    safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
+    flat = _safely_flat(sheet, prints, (safe[0], safe[1]), flatten)
     follow = _offsets(prints, foot, caps, options)
     offsets = np.full_like(follow, reach) if constant else follow
-    layers = Layers(P, normal, flat, above, below, prints.F, curvature, offsets[0], offsets[1])
+    layers = Layers(
+        flat.P,
+        flat.normal,
+        flat.flat,
+        flat.slopes[0],
+        flat.slopes[1],
+        prints.F,
+        curvature,
+        offsets[0],
+        offsets[1],
+    )
     layers, rung, shrinks = _climb(layers, follow, constant, points, options)
     bottom, top = horizons.heights(prints.U)
     control = _control(layers, bottom, top)
-    mid = TriMesh(P, prints.F)
-    return SheetMesh(control, mid, flat, np.stack([bottom, top]), layers, rung, shrinks)
+    heights = np.stack([bottom, top])
+    return SheetMesh(control, flat.flattenings, heights, prints.weight, layers, rung, shrinks)
 
 
 def _control(layers: Layers, bottom: Floats, top: Floats) -> ControlMesh:

@@ -109,15 +109,15 @@ class _System:
         return (length / self.grid.step) ** 6
 
     @property
-    def ridge(self) -> sp.sparray:
-        return 1e-9 * sp.eye_array(self.grid.size)
+    def ridge(self) -> sp.csr_array:
+        return sp.csr_array(1e-9 * sp.eye_array(self.grid.size))
 
 
 def _start(
     medial: MedialSheet, points: Floats, options: FitOptions
 ) -> tuple[_System, Sheet, Floats]:
     """Return the spline system, the first sheet and the first half thickness."""
-    margin = cKDTree(medial.mesh.V).query(points)[0].max() + 3
+    margin = float(np.max(cKDTree(medial.mesh.V).query(points)[0])) + 3
     low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
     grid = SplineGrid.over(low, high, options.knots)
     half_weight = (options.smooth_half / options.knots) ** 4

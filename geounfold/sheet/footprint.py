@@ -96,7 +96,7 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int) -> Footprint:
     at = np.floor((V - low) / cell).astype(np.int64)
     count = np.bincount(at[:, 0] * shape[1] + at[:, 1], minlength=shape.prod()).reshape(shape)
     held = count > 0
-    cells = ndi.binary_dilation(held, iterations=dilation, structure=np.ones((3, 3)))
+    cells = ndi.binary_dilation(held, iterations=dilation, structure=np.ones((3, 3), dtype=bool))
     node, F = np.unique(_triangles(np.asarray(cells)), return_inverse=True)
     i, j = np.divmod(node, shape[1] + 1)
     nodes = (low + cell * np.stack([i, j], axis=1)) @ turn.T

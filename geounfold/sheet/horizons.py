@@ -14,9 +14,11 @@ from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
 
 @dataclass(frozen=True, kw_only=True)
 class HorizonOptions:
-    """``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull
-    normal and the mid surface's; ``misfit``: largest departure from the half thickness.
-    Lengths in blocks."""
+    """How top and bottom are fitted; lengths in blocks.
+
+    ``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull normal
+    and the mid surface's; ``misfit``: largest departure from the half thickness.
+    """
 
     smooth: float = 1.5
     agree: float = 0.6

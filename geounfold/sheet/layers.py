@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from geounfold.geometry import tet_volumes, unique_edges
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.mesh import Floats, Ints
 from geounfold.prisms import prism_tets
 
 FRACTIONS = (-1.0, -0.6, 0.0, 0.6, 1.0)
@@ -89,8 +89,8 @@ def bad_nodes(layers: Layers, T: Ints, least: float = 1e-4) -> Ints:
 def neighbour_mean(F: Ints, n: int) -> sp.csr_array:
     """Return the (n, n) matrix that averages over each node's neighbours."""
     E = unique_edges(F)
-    A = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n))
-    A = (A + A.T).tocsr()
+    half = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n)).tocsr()
+    A = sp.csr_array(half + half.T)
     return sp.csr_array(sp.diags_array(1 / np.maximum(np.asarray(A.sum(axis=1)).ravel(), 1)) @ A)
 
 
@@ -109,8 +109,3 @@ def shrink(layers: Layers, nodes: Ints, mean: sp.csr_array, factor: float = 0.9)
         f = np.minimum(f, mean @ f)
         offsets.append(np.maximum(c * f, 0.05))
     return replace(layers, up=offsets[0], down=offsets[1])
-
-
-def inverted_blocks(layers: Layers, T: Ints, tet_of_block: Ints, misses: Bools) -> Ints:
-    """Return the footprint nodes of the tetrahedra that hold blocks failing the round trip."""
-    return np.unique(T[tet_of_block[misses]] % len(layers.P))

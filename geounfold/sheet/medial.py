@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from geounfold.backends.igl import face_components
+from geounfold.backends.igl import face_components, pinched_vertices
 from geounfold.errors import SplitError
 from geounfold.geometry import (
     face_normals,
@@ -116,8 +116,8 @@ def _harmonic_half(
 
 def _graph_laplacian(F: Ints, n: int) -> sp.csr_array:
     E = unique_edges(F)
-    A = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n))
-    A = (A + A.T).tocsr()
+    half = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n)).tocsr()
+    A = sp.csr_array(half + half.T)
     return sp.csr_array(sp.diags_array(np.asarray(A.sum(axis=1)).ravel()) - A)
 
 
@@ -133,7 +133,7 @@ def medial_sheet(
     split : SurfaceSplit
         Hull in working units.
     flatten : callable
-        ``flatten(mesh, start)`` -> uv (n, 2), an isometric flattening.
+        ``flatten(mesh, start)`` -> uv (n, 2), an isometric flattening; start may be None.
     options : MedialOptions
         See there.
 
@@ -149,9 +149,7 @@ def medial_sheet(
     top = (split.side > 0) & (away | _far_inside(split, centres, options.domain))
     if not top.any():
         raise SplitError("the split left no top away from the rim; try another --hull")
-    faces = np.flatnonzero(top)
-    component = face_components(mesh.F[faces])
-    faces = faces[component == np.bincount(component).argmax()]
+    faces = _one_sheet(mesh.F, np.flatnonzero(top))
     part, old = mesh.submesh(faces)
     half, trusted = _harmonic_half(split, part.F, faces, core, len(old))
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * _graph_laplacian(part.F, len(old)))
@@ -161,6 +159,21 @@ def medial_sheet(
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
     return MedialSheet(medial, _principal(uv), half, trusted, core, at_vertices)
+
+
+def _one_sheet(F: Ints, faces: Ints) -> Ints:
+    """Return the largest part of some faces that is a manifold surface.
+
+    Faces around a vertex where two fans meet are left out.
+    """
+    while len(faces):
+        component = face_components(F[faces])
+        faces = faces[component == np.bincount(component).argmax()]
+        pinched = pinched_vertices(F[faces])
+        if not len(pinched):
+            return faces
+        faces = faces[~np.isin(F[faces], pinched).any(axis=1)]
+    raise SplitError("the top is no surface: every part of it is pinched; try another --hull")
 
 
 def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
@@ -179,4 +192,5 @@ def _principal(uv: Floats) -> Floats:
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     axes[0] *= 1.0 if axes[0][np.abs(axes[0]).argmax()] > 0 else -1.0
     axes[1] = [-axes[0, 1], axes[0, 0]]
-    return centred @ axes.T
+    out: Floats = centred @ axes.T
+    return out

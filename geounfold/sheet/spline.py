@@ -142,10 +142,12 @@ class SplineGrid:
         return sp.csc_array(total)
 
 
-def spd_solver(A: sp.sparray) -> Callable[[Floats], Floats]:
+def spd_solver(A: sp.csr_array | sp.csc_array | sp.coo_array) -> Callable[[Floats], Floats]:
     """Factor a symmetric positive definite matrix once; the result solves ``A x = b``."""
     options = {"SymmetricMode": True}
-    lu = spl.splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    lu = spl.splu(
+        sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+    )
     solve: Callable[[Floats], Floats] = lu.solve
     return solve
 

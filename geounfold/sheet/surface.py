@@ -103,7 +103,8 @@ class Sheet:
         """Return a search for feet on the part of the sheet within ``reach`` of parameters."""
         U, F = self.samples()
         if near is not None and np.isfinite(reach):
-            keep = cKDTree(near).query(U, distance_upper_bound=reach)[0] < reach
+            distance = cKDTree(near).query(U, distance_upper_bound=reach)[0]
+            keep = np.asarray(distance < reach)
             F = F[keep[F].all(axis=1)]
             used, F = np.unique(F, return_inverse=True)
             U, F = U[used], F.reshape(-1, 3)
@@ -178,7 +179,7 @@ def blur_shift(jet: Jet, t: Floats, variance: Floats) -> Floats:
     return (first + along(cos * jet.v - sin * jet.u, mean - spread)) / 2
 
 
-def slip_potential(sheet: Sheet, U: Floats, weights: Floats, bending: sp.sparray) -> Floats:
+def slip_potential(sheet: Sheet, U: Floats, weights: Floats, bending: sp.csc_array) -> Floats:
     """Return coefficients (size, 2) of phi with grad phi = second form (flexural slip).
 
     Before folding, the point at offset t over U lay at u = U - t phi(U); the free constant

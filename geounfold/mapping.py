@@ -137,7 +137,7 @@ class UnfoldingMap:
         InputError
             Points of another shape, or not finite.
         """
-        P = _checked_points(points)
+        P = checked_points(points)
         mesh = self.control.folded if inverse else self.control.unfolded
         if not len(P):
             return Carried(P, np.empty(0), np.empty(0, bool), np.empty(0, np.int64))
@@ -189,7 +189,8 @@ def _checksum(arrays: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def _checked_points(points: Floats) -> Floats:
+def checked_points(points: Floats) -> Floats:
+    """Return points as finite, contiguous (n, 3) floats, or raise InputError."""
     P = np.ascontiguousarray(points, dtype=np.float64)
     if P.ndim != 2 or P.shape[1] != 3:
         raise InputError(f"points must have shape (n, 3), but have {P.shape}")

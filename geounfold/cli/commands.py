@@ -15,7 +15,8 @@ from geounfold.io.coordinates import Triple, parse_columns
 from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
 
 if TYPE_CHECKING:
-    from geounfold.pipeline import Mapped, UnfoldOptions
+    from geounfold.mapping import Carried
+    from geounfold.options import UnfoldOptions
 
 _JSON = (".json",)
 _MAP = (".npz",)
@@ -51,8 +52,8 @@ def unfold(args: Namespace, console: Console) -> None:
 
     result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
     summary = {**result.summary(), "input": table.facts()}
-    columns = _columns(_UNFOLDED, result) | result.columns
-    carried = None if samples is None else _columns(_UNFOLDED, result.to_flat(samples.points))
+    columns = _columns(_UNFOLDED, result.carried) | result.columns
+    carried = None if samples is None else _columns(_UNFOLDED, result.map.carry(samples.points))
     console.stage("writing")
     with outputs.writing() as parts:
         table.write(parts["--output"], columns)
@@ -80,15 +81,15 @@ def carry(args: Namespace, console: Console) -> None:
     )
     existing_file(Path(args.map))
     table = _read(args.points, args, console)
-    from geounfold import pipeline
+    from geounfold import mapping
 
-    saved = pipeline.load(args.map)
+    saved = mapping.load(args.map)
     console.stage("carrying points")
     if args.inverse:
-        columns = _columns(_FOLDED, saved.to_folded(table.points))
+        columns = _columns(_FOLDED, saved.carry(table.points, inverse=True))
         del columns["stratigraphic"]
     else:
-        columns = _columns(_UNFOLDED, saved.to_flat(table.points))
+        columns = _columns(_UNFOLDED, saved.carry(table.points))
     with outputs.writing() as parts:
         table.write(parts["--output"], columns)
     console.done(f"{len(table)} points carried into {args.output}")
@@ -207,7 +208,7 @@ def _read_samples(args: Namespace, console: Console) -> PointTable | None:
     return table
 
 
-def _columns(names: Triple, mapped: Mapped) -> dict[str, Any]:
+def _columns(names: Triple, mapped: Carried) -> dict[str, Any]:
     """Return where points came to lie, by output column."""
     points = {name: mapped.points[:, axis] for axis, name in enumerate(names)}
     return {**points, "stratigraphic": mapped.stratigraphic, "location": mapped.location}

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geounfold.mesh import TriMesh
+import numpy as np
+
+from geounfold.mesh import Floats, TriMesh
+
+UNEQUAL = 1.2
+"""Ratio of block sides from which the density is blurred per axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,3 +46,15 @@ class Hull:
     blur: float
     dropped: int = 0
     reason: str = ""
+
+    def blur_variance(self, steps: Floats | None) -> Floats:
+        """Return the blur's variance along each working axis, (3,).
+
+        Parameters
+        ----------
+        steps : (3,) float or None
+            Block sides in working units, as given to the hull.
+        """
+        sides = np.ones(3) if steps is None or steps.max() / steps.min() <= UNEQUAL else steps
+        out: Floats = self.blur**2 * sides * sides
+        return out

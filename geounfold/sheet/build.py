@@ -75,6 +75,25 @@ class SheetMesh:
     rung: str
     shrinks: int
 
+    def surfaces(self, control: ControlMesh) -> dict[str, tuple[TriMesh, TriMesh]]:
+        """Return mid, top and bottom surface, folded and unfolded, over the footprint.
+
+        ``control`` is this control mesh with any datum: unfolded z is linear in height.
+        """
+        layers, n = self.layers, len(self.layers.P)
+        middle = len(FRACTIONS) // 2
+        z = control.unfolded.V[:, 2].reshape(len(FRACTIONS), n)
+        rate = (z[-1] - z[middle]) / layers.up
+        bottom, top = self.heights
+        out = {}
+        for name, height in (("mid", np.zeros(n)), ("top", top), ("bottom", bottom)):
+            slope = np.where(height[:, None] >= 0, layers.slope_up, layers.slope_down)
+            flat = layers.flat + np.abs(height)[:, None] * slope
+            unfolded = np.column_stack([flat, z[middle] + rate * height])
+            folded = layers.P + height[:, None] * layers.normal
+            out[name] = (TriMesh(folded, layers.F), TriMesh(unfolded, layers.F))
+        return out
+
 
 def arc_lengths(V: Floats, normal: Floats, F: Ints) -> Floats:
     """Return the lengths of the edges measured along arcs that meet the normals, (k,).

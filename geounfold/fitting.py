@@ -1,0 +1,228 @@
+"""Fit one body: hull, split, control mesh by the chosen method; all in working units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.control import ControlMesh, with_datum
+from geounfold.errors import ControlMeshError
+from geounfold.flattening import FLATTENERS, Flattening, flatten
+from geounfold.frame import Frame
+from geounfold.geometry import face_normals, tet_volumes, triangle_areas
+from geounfold.hull import Hull, extract_hull
+from geounfold.mesh import Floats, TriMesh
+from geounfold.options import UnfoldOptions
+from geounfold.reference import split_reference
+from geounfold.sheet import SheetResult, fit_body
+from geounfold.split import SurfaceSplit, split
+
+Stage = Callable[[str], AbstractContextManager[None]]
+"""``with stage("hull"):`` times a stage and shows its name."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePair:
+    """A reference surface in both spaces, and how it was flattened."""
+
+    folded: TriMesh
+    unfolded: TriMesh
+    flattening: Flattening
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFit:
+    """Everything made of one body, working units.
+
+    Attributes
+    ----------
+    hull : Hull or None
+        None where reference surfaces were given.
+    split : SurfaceSplit
+        The hull's faces as top, bottom and rim.
+    control : ControlMesh
+        Tetrahedra in both spaces; unfolded z up is the top side.
+    surfaces : dict of SurfacePair
+        ``top``, ``bottom`` and, for the sheet method, ``mid``.
+    flattenings : dict of Flattening
+        Every surface that was flattened.
+    sheet : SheetResult or None
+        The sheet method's stages.
+    notes : dict
+        Figures of the method for the summary.
+    """
+
+    hull: Hull | None
+    split: SurfaceSplit
+    control: ControlMesh
+    surfaces: dict[str, SurfacePair]
+    flattenings: dict[str, Flattening]
+    sheet: SheetResult | None
+    notes: dict[str, object]
+
+
+def fit(
+    points: Floats,
+    frame: Frame,
+    options: UnfoldOptions,
+    reference: tuple[TriMesh, TriMesh] | None,
+    stage: Stage,
+) -> BodyFit:
+    """Return the fit of one body.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        The body's blocks, working units.
+    frame : Frame
+        Working frame.
+    options : UnfoldOptions
+        See there.
+    reference : (TriMesh, TriMesh) or None
+        Top and bottom given by the user, working units.
+    stage : callable
+        See Stage.
+
+    Raises
+    ------
+    HullError, NoSheetError, SplitError, FlatteningError
+        As the stages do.
+    ControlMeshError
+        Tetrahedra are inverted, and ``allow_uncertified`` is off.
+    """
+    hull = None
+    if reference is None:
+        with stage("hull"):
+            method = options.hull
+            if options.method == "thesis" and method == "auto":
+                method = "alpha"
+            hull = extract_hull(points, frame.steps, method, options.hull_options)
+        with stage("split"):
+            parts = split(hull.mesh, options.split)
+    else:
+        with stage("split"):
+            parts = split_reference(*reference)
+    if options.method == "thesis":
+        result = _fit_thesis(points, hull, parts, options, stage)
+    else:
+        result = _fit_sheet(points, frame, hull, parts, options, stage)
+    if top_looks_down(parts, frame.up_in_work(options.up)):
+        result = _turned_over(result)
+    _check_upright(result.control, frame, options)
+    return result
+
+
+def _flattener(
+    options: UnfoldOptions,
+) -> Callable[[TriMesh, Floats | None, Floats | None], Flattening]:
+    """Return the chosen flattener; arc lengths reach it where it works on lengths."""
+    intrinsic = FLATTENERS[options.flattener].intrinsic
+
+    def run(mesh: TriMesh, start: Floats | None, rest: Floats | None) -> Flattening:
+        usable = rest if intrinsic else None
+        return flatten(mesh, options.flattener, start=start, rest=usable)
+
+    return run
+
+
+def _fit_sheet(
+    points: Floats,
+    frame: Frame,
+    hull: Hull | None,
+    parts: SurfaceSplit,
+    options: UnfoldOptions,
+    stage: Stage,
+) -> BodyFit:
+    variance = np.zeros(3) if hull is None else hull.blur_variance(frame.steps)
+    inset = 0.0 if hull is None else hull.inset
+    with stage("sheet"):
+        result = fit_body(
+            parts, points, variance, inset, _flattener(options), options.sheet_options
+        )
+    mesh = result.mesh
+    bottom, top = mesh.heights
+    control = with_datum(mesh.control, bottom, top, mesh.weight, options.datum)
+    surfaces = {
+        name: SurfacePair(folded, unfolded, mesh.flattenings[name])
+        for name, (folded, unfolded) in mesh.surfaces(control).items()
+    }
+    notes = {
+        "rung": mesh.rung,
+        "shrinks": mesh.shrinks,
+        "roughness": result.fitted.roughness,
+        "smoothing": result.fitted.smoothing,
+        "accepted_samples": result.fitted.accepted,
+    }
+    return BodyFit(hull, parts, control, surfaces, mesh.flattenings, result, notes)
+
+
+def _fit_thesis(
+    points: Floats, hull: Hull | None, parts: SurfaceSplit, options: UnfoldOptions, stage: Stage
+) -> BodyFit:
+    raise NotImplementedError
+
+
+def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
+    """Return whether the split's top side looks away from up, (3,) in working units.
+
+    Decided once for the whole sheet by the area-weighted normals of its top; a sheet whose
+    mean normal is square to up (within 3 degrees) keeps the top the split chose.
+    """
+    mine = parts.side > 0
+    F = parts.mesh.F[mine]
+    area = triangle_areas(parts.mesh.V, F)
+    mean = (area[:, None] * face_normals(parts.mesh.V, F)).sum(axis=0)
+    return bool(mean @ up < -0.05 * float(np.linalg.norm(mean)))
+
+
+def _over(V: Floats) -> Floats:
+    return V * np.array([1.0, -1.0, -1.0])
+
+
+def _turned_over(result: BodyFit) -> BodyFit:
+    """Return the fit with top and bottom exchanged: the flat space turned about its x axis."""
+    control = ControlMesh(
+        result.control.folded,
+        result.control.unfolded.with_vertices(_over(result.control.unfolded.V)),
+        1 - result.control.stratigraphic,
+    )
+    other = {"top": "bottom", "bottom": "top"}
+    surfaces = {
+        other.get(name, name): SurfacePair(
+            pair.folded, pair.unfolded.with_vertices(_over(pair.unfolded.V)), pair.flattening
+        )
+        for name, pair in result.surfaces.items()
+    }
+    flattenings = {other.get(name, name): f for name, f in result.flattenings.items()}
+    parts = result.split
+    turned = SurfaceSplit(
+        parts.mesh,
+        -parts.side,
+        parts.rim,
+        parts.opposite,
+        parts.thickness,
+        parts.median_thickness,
+        parts.adjacency,
+        not parts.flipped_up,
+    )
+    return BodyFit(result.hull, turned, control, surfaces, flattenings, result.sheet, result.notes)
+
+
+def _check_upright(control: ControlMesh, frame: Frame, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError where tetrahedra are inverted, unless that is allowed."""
+    folded = tet_volumes(control.folded.V, control.folded.T) <= 0
+    unfolded = tet_volumes(control.unfolded.V, control.unfolded.T) <= 0
+    bad = folded | unfolded
+    if options.allow_uncertified or not bad.any():
+        return
+    place = frame.to_world(control.folded.V[control.folded.T[bad]].mean(axis=(0, 1))[None])[0]
+    where = ", ".join(f"{c:.6g}" for c in place)
+    raise ControlMeshError(
+        f"{int(bad.sum())} of {len(bad)} control tetrahedra are inverted "
+        f"({int(folded.sum())} folded, {int(unfolded.sum())} unfolded), around ({where}); "
+        "the fold is too tight there for this block size: try another --hull or --flattener, "
+        "or --allow-uncertified to write the answer all the same"
+    )

@@ -1,0 +1,99 @@
+"""What can be chosen for an unfolding; every value is checked when the options are made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from geounfold.control import DATUMS
+from geounfold.errors import OptionError
+from geounfold.flattening import FLATTENERS
+from geounfold.hull import HullOptions
+from geounfold.quality import NEIGHBOURS
+from geounfold.sheet import SheetOptions
+from geounfold.split import SPLITS
+from geounfold.thesis import ThesisOptions
+
+METHODS = ("sheet", "thesis")
+"""Methods for whole bodies: ours, and the thesis's."""
+
+
+def _one_of(name: str, value: str, valid: Iterable[str]) -> None:
+    valid = tuple(valid)
+    if value not in valid:
+        raise OptionError(f"unknown {name} {value!r}; valid: {', '.join(valid)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnfoldOptions:
+    """Options of an unfolding.
+
+    Parameters
+    ----------
+    method : str
+        ``sheet`` (ours) or ``thesis`` (vertical pairing, flat at mean heights).
+    flattener : str
+        A name in FLATTENERS.
+    hull : str
+        ``auto`` or a name in HULLS.
+    split : str
+        A name in SPLITS.
+    up : (float, float, float)
+        World direction that the top (hanging wall) looks to; decided once for the body.
+    datum : str
+        Which surface is flat: ``mid``, ``top``, ``bottom``, or ``proportional`` (both).
+    body : int, "all" or None
+        Which of several separate bodies to unfold, 0 the largest; None when there is one.
+    neighbours : int
+        Neighbours per point in NMD and epsilon.
+    allow_uncertified : bool
+        Write an answer with inverted tetrahedra instead of failing.
+    hull_options, sheet_options, thesis_options
+        The stages' own options.
+
+    Raises
+    ------
+    OptionError
+        A value outside the valid ones, which the message lists.
+
+    Examples
+    --------
+    >>> UnfoldOptions(datum="top").flattener
+    'spring'
+    """
+
+    method: str = "sheet"
+    flattener: str = "spring"
+    hull: str = "auto"
+    split: str = "signed"
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    datum: str = "mid"
+    body: int | str | None = None
+    neighbours: int = NEIGHBOURS
+    allow_uncertified: bool = False
+    hull_options: HullOptions = field(default_factory=HullOptions)
+    sheet_options: SheetOptions = field(default_factory=SheetOptions)
+    thesis_options: ThesisOptions = field(default_factory=ThesisOptions)
+
+    def __post_init__(self) -> None:
+        _one_of("method", self.method, METHODS)
+        _one_of("flattener", self.flattener, FLATTENERS)
+        _one_of("hull", self.hull, ("auto", "alpha", "ball_pivoting", "poisson", "density"))
+        _one_of("split", self.split, SPLITS)
+        _one_of("datum", self.datum, DATUMS)
+        up = np.asarray(self.up, dtype=np.float64)
+        if up.shape != (3,) or not np.isfinite(up).all() or not up.any():
+            raise OptionError(f"up must be three finite numbers, not all zero, but is {self.up}")
+        if isinstance(self.body, str) and self.body != "all":
+            raise OptionError(f"body must be a number from 0 or 'all', but is {self.body!r}")
+        if isinstance(self.body, int) and self.body < 0:
+            raise OptionError(f"body must be a number from 0 or 'all', but is {self.body}")
+        if self.neighbours < 1:
+            raise OptionError(f"neighbours must be at least 1, but is {self.neighbours}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the options as plain nested dicts."""
+        return asdict(self)

@@ -1,0 +1,432 @@
+"""Unfold a body: the stages in order, and everything that came of them."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pandas as pd
+
+from geounfold._version import __version__
+from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
+from geounfold.control import ControlMesh, scaled
+from geounfold.errors import InputError
+from geounfold.fitting import BodyFit, SurfacePair, fit
+from geounfold.flattening import Flattening
+from geounfold.frame import Frame, working_frame
+from geounfold.geometry import enclosed_volume, triangle_areas
+from geounfold.hull import Hull
+from geounfold.io.coordinates import coordinate_columns, numbers
+from geounfold.lattice import Lattice, measure_lattice
+from geounfold.mapping import Carried, UnfoldingMap, checked_points
+from geounfold.mesh import Floats, TetMesh, TriMesh, as_trimesh
+from geounfold.options import UnfoldOptions
+from geounfold.quality import Quality, assess
+
+Progress = Callable[[str], None]
+
+
+class _Clock:
+    """Seconds per stage, with the stages' names shown as they start."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress = progress
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        if self._progress is not None:
+            self._progress(name)
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            taken = time.perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + taken
+
+
+def unfold(
+    points: Floats | pd.DataFrame,
+    options: UnfoldOptions | None = None,
+    *,
+    top: TriMesh | tuple[Any, Any] | None = None,
+    bottom: TriMesh | tuple[Any, Any] | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Unfolding:
+    """Take the folds out of a body given by its block centroids.
+
+    Parameters
+    ----------
+    points : (n, 3) array or DataFrame
+        Centroids in any length unit and any coordinates; of a DataFrame the coordinate
+        columns are found by name (centroid_x/y/z, x/y/z, XC/YC/ZC, easting/...).
+    options : UnfoldOptions, optional
+        Defaults where not given.
+    top, bottom : TriMesh or (V, F), optional
+        Hanging wall and footwall in the points' coordinates, in place of an extracted hull;
+        both or neither.
+    progress : callable, optional
+        Called with every stage's name as it starts.
+    **changes
+        Fields of UnfoldOptions given by name.
+
+    Returns
+    -------
+    Unfolding
+
+    Raises
+    ------
+    InputError
+        Points that are no body (too few, flat, several bodies, no sheet), or options outside
+        their valid values.
+    HullError, SplitError, FlatteningError, ControlMeshError
+        A stage failed; the message says where and what to try.
+
+    Examples
+    --------
+    >>> import geounfold as gu
+    >>> body = gu.simulate("sim_case_1")
+    >>> u = gu.unfold(body.folded)
+    >>> u.points.shape == body.folded.shape
+    True
+    """
+    chosen = replace(options or UnfoldOptions(), **changes)
+    clock = _Clock(progress)
+    with clock.stage("frame"):
+        P = _points(points)
+        lattice = measure_lattice(P)
+        check_points(P, lattice)
+        frame = working_frame(P, lattice)
+        work = np.ascontiguousarray(frame.snap(frame.to_work(P)))
+        groups = select_body(P, separate_bodies(work, frame), chosen.body)
+    reference = _reference(top, bottom, frame)
+    fits = [fit(work[group], frame, chosen, reference, clock.stage) for group in groups]
+    control = _joined([f.control for f in fits])
+    with clock.stage("map"):
+        mapping = UnfoldingMap(frame, control)
+        carried = mapping.carry(P)
+        back = mapping.carry(carried.points, inverse=True)
+    with clock.stage("quality"):
+        world = _in_world(control, frame)
+        quality = assess(world, carried.element, P, carried.points, chosen.neighbours)
+    fitted = sum(len(group) for group in groups)
+    return Unfolding(
+        P, chosen, frame, lattice, fits, mapping, carried, back, quality, clock.seconds, fitted
+    )
+
+
+def _points(points: Floats | pd.DataFrame) -> Floats:
+    """Return finite (n, 3) coordinates, of a DataFrame those of its coordinate columns."""
+    if isinstance(points, pd.DataFrame):
+        names = [str(name) for name in points.columns]
+        columns = [points.iloc[:, k] for k in coordinate_columns(names)]
+        points = np.column_stack([numbers(column) for column in columns])
+    return checked_points(points)
+
+
+def _reference(
+    top: TriMesh | tuple[Any, Any] | None, bottom: TriMesh | tuple[Any, Any] | None, frame: Frame
+) -> tuple[TriMesh, TriMesh] | None:
+    if top is None and bottom is None:
+        return None
+    if top is None or bottom is None:
+        raise InputError("top and bottom reference surfaces belong together: give both or neither")
+    upper, lower = (as_trimesh(mesh) for mesh in (top, bottom))
+    return (
+        upper.with_vertices(frame.to_work(upper.V)),
+        lower.with_vertices(frame.to_work(lower.V)),
+    )
+
+
+def _joined(controls: list[ControlMesh]) -> ControlMesh:
+    """Return several bodies' control meshes as one, side by side along unfolded x."""
+    if len(controls) == 1:
+        return controls[0]
+    folded, unfolded, tets, stratigraphic = [], [], [], []
+    edge, count = 0.0, 0
+    for control in controls:
+        V = control.unfolded.V
+        shift = np.array([edge - float(V[:, 0].min()), 0.0, 0.0])
+        edge += float(np.ptp(V[:, 0])) + 10.0
+        folded.append(control.folded.V)
+        unfolded.append(V + shift)
+        tets.append(control.folded.T + count)
+        stratigraphic.append(control.stratigraphic)
+        count += len(V)
+    T = np.concatenate(tets)
+    return ControlMesh(
+        TetMesh(np.concatenate(folded), T),
+        TetMesh(np.concatenate(unfolded), T),
+        np.concatenate(stratigraphic),
+    )
+
+
+def _in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
+    return scaled(control, frame.to_world(control.folded.V), frame.scale)
+
+
+class Unfolding:
+    """An unfolded body: its points, the map both ways, every stage's meshes, the figures.
+
+    Made by ``unfold``; all coordinates are true to scale, in the input's unit.
+
+    Attributes
+    ----------
+    folded : (n, 3) float
+        The points as given.
+    points : (n, 3) float
+        The points unfolded, in the same order; z is the stratigraphic coordinate.
+    stratigraphic : (n,) float
+        0 at the bottom surface, 1 at the top.
+    location : (n,) str
+        ``inside`` the control mesh, or ``extrapolated``.
+    options : UnfoldOptions
+        As used.
+    frame : Frame
+        The working frame.
+    lattice : Lattice or None
+        The block lattice, None for scattered points.
+    fits : list of BodyFit
+        Every stage, in working units, one per body.
+    map : UnfoldingMap
+        Carries any points both ways.
+    quality : Quality
+        Figures for the whole and per block.
+    seconds : dict of float
+        Per stage.
+    """
+
+    def __init__(
+        self,
+        folded: Floats,
+        options: UnfoldOptions,
+        frame: Frame,
+        lattice: Lattice | None,
+        fits: list[BodyFit],
+        mapping: UnfoldingMap,
+        carried: Carried,
+        back: Carried,
+        quality: Quality,
+        seconds: dict[str, float],
+        fitted_points: int,
+    ) -> None:
+        self.folded = folded
+        self.options = options
+        self.frame = frame
+        self.lattice = lattice
+        self.fits = fits
+        self.map = mapping
+        self.carried = carried
+        self.quality = quality
+        self.seconds = seconds
+        self._returned = back.points
+        self._fitted_points = fitted_points
+
+    @property
+    def points(self) -> Floats:
+        """The unfolded points, (n, 3)."""
+        return self.carried.points
+
+    @property
+    def stratigraphic(self) -> Floats:
+        """0 at the bottom surface, 1 at the top, (n,)."""
+        return self.carried.stratigraphic
+
+    @property
+    def location(self) -> np.ndarray:
+        """``inside`` or ``extrapolated`` for every point, (n,) of str."""
+        return self.carried.location
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear."""
+        return self.quality.blocks.columns()
+
+    def to_flat(self, points: Floats) -> Floats:
+        """Return other folded points (m, 3) in the flat space."""
+        return self.map.to_flat(points)
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Return points of the flat space (m, 3) in the folded one."""
+        return self.map.to_folded(points)
+
+    @property
+    def hull(self) -> Hull | None:
+        """The (largest) body's hull, in working units; None with reference surfaces."""
+        return self.fits[0].hull
+
+    @property
+    def hull_mesh(self) -> TriMesh:
+        """The (largest) body's split surface in the data's coordinates."""
+        mesh = self.fits[0].split.mesh
+        return mesh.with_vertices(self.frame.to_world(mesh.V))
+
+    @cached_property
+    def surfaces(self) -> dict[str, SurfacePair]:
+        """Top, bottom and mid surface of the (largest) body, folded and unfolded."""
+        return {
+            name: SurfacePair(
+                pair.folded.with_vertices(self.frame.to_world(pair.folded.V)),
+                pair.unfolded.with_vertices(pair.unfolded.V * self.frame.scale),
+                pair.flattening,
+            )
+            for name, pair in self.fits[0].surfaces.items()
+        }
+
+    @property
+    def top(self) -> SurfacePair:
+        """The hanging wall in both spaces."""
+        return self.surfaces["top"]
+
+    @property
+    def bottom(self) -> SurfacePair:
+        """The footwall in both spaces."""
+        return self.surfaces["bottom"]
+
+    @cached_property
+    def control(self) -> ControlMesh:
+        """The control mesh in the data's coordinates and unit."""
+        return _in_world(self.map.control, self.frame)
+
+    @property
+    def outside_share(self) -> float:
+        """Share of the points that the control mesh does not hold."""
+        return float(np.mean(~self.carried.inside))
+
+    @property
+    def round_trip_max(self) -> float:
+        """Largest distance, over the points inside, between a point and its return."""
+        inside = self.carried.inside
+        if not inside.any():
+            return 0.0
+        return float(np.linalg.norm(self._returned - self.folded, axis=1)[inside].max())
+
+    @property
+    def certificate(self) -> dict[str, Any]:
+        """What was proved of the map; ``injective`` is True only when all of it was."""
+        return {
+            "injective": False,
+            "inverted_folded": self.map.control.inverted_folded,
+            "inverted_unfolded": self.map.control.inverted_unfolded,
+            "unchecked": "self-intersection of the control mesh's boundary",
+        }
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the map (not the points) as .npz; ``geounfold.load`` reads it."""
+        self.map.save(path)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ran and how good it is, ready for JSON."""
+        certificate = self.certificate
+        return {
+            "version": __version__,
+            "options": self.options.as_dict(),
+            "points": len(self.folded),
+            "bodies": len(self.fits),
+            "lattice": self._lattice_summary(),
+            "seconds": self.seconds,
+            "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "hull": self._hull_summary(),
+            **{name: self._surface_summary(pair) for name, pair in self.surfaces.items()},
+            "flattening": {k: _flattening_summary(f) for k, f in self.fits[0].flattenings.items()},
+            "method": self.fits[0].notes,
+            "control_mesh": self._control_summary(),
+            "inverted_folded": certificate["inverted_folded"],
+            "inverted_unfolded": certificate["inverted_unfolded"],
+            "injective": certificate["injective"],
+            "certificate": certificate,
+            "outside_share": self.outside_share,
+            "round_trip_max": self.round_trip_max,
+            **self.quality.summary(),
+            "warnings": self._warnings(),
+        }
+
+    def _lattice_summary(self) -> dict[str, Any]:
+        spacing = self.frame.scale
+        if self.lattice is None:
+            return {"found": False, "spacing": spacing}
+        return {"found": True, "spacing": spacing, "steps": self.lattice.steps.tolist()}
+
+    def _hull_summary(self) -> dict[str, Any]:
+        hull = self.hull
+        if hull is None:
+            return {"method": "reference surfaces"}
+        cube = self.frame.scale**3
+        return {
+            "method": hull.method,
+            "reason": hull.reason,
+            "faces": len(hull.mesh.F),
+            "volume": enclosed_volume(hull.mesh.V, hull.mesh.F) * cube,
+            "blocks_volume": hull.blocks_volume * cube,
+            "closed": True,
+            "manifold": True,
+            "dropped_faces": hull.dropped,
+        }
+
+    @staticmethod
+    def _surface_summary(pair: SurfacePair) -> dict[str, Any]:
+        before = triangle_areas(pair.folded.V, pair.folded.F).sum()
+        after = triangle_areas(pair.unfolded.V, pair.unfolded.F).sum()
+        return {"faces": len(pair.folded.F), "area": float(before), "area_unfolded": float(after)}
+
+    def _control_summary(self) -> dict[str, Any]:
+        control = self.map.control
+        return {
+            "vertices": len(control.folded.V),
+            "tetrahedra": len(control.folded.T),
+            "volume_folded": self.quality.volume_folded,
+            "volume_unfolded": self.quality.volume_unfolded,
+        }
+
+    def _warnings(self) -> list[str]:
+        out = []
+        duplicates = count_duplicates(self.folded)
+        if duplicates:
+            out.append(f"{duplicates} points repeat the coordinates of another; all were kept")
+        apart = len(self.folded) - self._fitted_points
+        if apart:
+            out.append(
+                f"{apart} points are not part of the unfolded body; they were carried by the "
+                "nearest element of its control mesh"
+            )
+        outside = int((~self.carried.inside).sum())
+        if outside:
+            out.append(
+                f"{outside} of {len(self.folded)} points lie outside the control mesh and were "
+                "carried by its nearest element; they are marked extrapolated"
+            )
+        inverted = self.map.control.inverted_folded + self.map.control.inverted_unfolded
+        if inverted:
+            out.append(f"{inverted} control tetrahedra are inverted: the map folds over there")
+        return out
+
+    def __repr__(self) -> str:
+        """Return one line: points, method, error and outside share."""
+        return (
+            f"<Unfolding of {len(self.folded)} points by {self.options.method}: epsilon "
+            f"{self.quality.nmd.mean:.4f}, {self.outside_share:.2%} outside>"
+        )
+
+
+def _flattening_summary(flattening: Flattening) -> dict[str, Any]:
+    def ends(history: Floats) -> list[float]:
+        return [float(history[0]), float(history[-1])] if len(history) else []
+
+    return {
+        "method": flattening.method,
+        "iterations": flattening.iterations,
+        "stop": str(flattening.stop),
+        "energy": ends(flattening.energy),
+        "area_change": ends(flattening.area_error)[-1:],
+        "edge_strain": ends(flattening.edge_error)[-1:],
+        "flips": flattening.flips,
+        "note": flattening.note,
+    }

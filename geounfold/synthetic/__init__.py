@@ -1,0 +1,50 @@
+"""Simulated bodies and surfaces whose unfolding is known exactly."""
+
+from geounfold.synthetic.body import Body, FoldSpec, Sheet
+from geounfold.synthetic.catalogue import CASES, simulate
+from geounfold.synthetic.outline import (
+    Bulge,
+    Ellipse,
+    Embayment,
+    Even,
+    Gap,
+    Hole,
+    Lens,
+    Neck,
+    ObliqueCut,
+    Ragged,
+    Swell,
+    Wedge,
+)
+from geounfold.synthetic.profile import Bend, Bump, FlexuralSlip, Profile, Sinusoid
+from geounfold.synthetic.surfaces import AnalyticSurface, cone, cylinder, slab, spherical_cap
+
+__all__ = [
+    "CASES",
+    "AnalyticSurface",
+    "Bend",
+    "Body",
+    "Bulge",
+    "Bump",
+    "Ellipse",
+    "Embayment",
+    "Even",
+    "FlexuralSlip",
+    "FoldSpec",
+    "Gap",
+    "Hole",
+    "Lens",
+    "Neck",
+    "ObliqueCut",
+    "Profile",
+    "Ragged",
+    "Sheet",
+    "Sinusoid",
+    "Swell",
+    "Wedge",
+    "cone",
+    "cylinder",
+    "simulate",
+    "slab",
+    "spherical_cap",
+]

@@ -1,0 +1,450 @@
+"""Simulated folded bodies: what one is made of, and its geometry, exact both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import OptionError
+from geounfold.mesh import Bools, Floats, TriMesh
+from geounfold.synthetic.outline import Even, Place, Region, Thickness
+from geounfold.synthetic.profile import FlexuralSlip, Profile, require_finite, require_positive
+
+GRIDS = ("before", "after")
+
+
+def rotation(bearing: float, plunge: float, dip: float) -> Floats:
+    """Return axes (3, 3) turned as block models are: rows x, y, z in world coordinates.
+
+    Parameters
+    ----------
+    bearing : float
+        Of the y axis, degrees clockwise from north (world +y).
+    plunge : float
+        Of the y axis, degrees below the horizontal.
+    dip : float
+        Degrees by which the x axis then turns downwards about the y axis.
+
+    Examples
+    --------
+    >>> rotation(90, 0, 0).round(12)[1].tolist()
+    [1.0, 0.0, 0.0]
+    """
+    (a, b, c), (sa, sb, sc) = (f(np.radians([bearing, plunge, dip])) for f in (np.cos, np.sin))
+    turn = np.array([[a, -sa, 0.0], [sa, a, 0.0], [0.0, 0.0, 1.0]])
+    tip = np.array([[1.0, 0.0, 0.0], [0.0, b, -sb], [0.0, sb, b]])
+    roll = np.array([[c, 0.0, -sc], [0.0, 1.0, 0.0], [sc, 0.0, c]])
+    out: Floats = roll @ tip @ turn
+    return out
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoldSpec:
+    """A recipe of a simulated body.  Lengths are in one unit of the user's, say metres.
+
+    Parameters
+    ----------
+    description : str
+        One line for lists.
+    profile : Profile
+        Heading of the mid surface along arc length, in the section across the fold axis.
+    length, width : float
+        The sheet's extent before folding, across and along the fold axis.
+    thickness : float, Even, Lens, Swell, Wedge or Bulge
+        Heights of bottom and top about the mid surface.
+    outline : tuple of regions
+        Ellipse, Hole, Ragged, Embayment, ObliqueCut, Neck, Gap; the body lies in all of them.
+    steps : (float, float, float)
+        Block sides along the lattice's axes.
+    grid : {'before', 'after'}
+        Blocks are regular before folding, or after it (as a block model's are).
+    azimuth, plunge, tilt : float
+        Of the fold axis, as bearing, plunge and dip of ``rotation``; degrees.
+    lattice_bearing, lattice_plunge, lattice_dip : float
+        Of the lattice of a body gridded after folding, as in ``rotation``; degrees.
+    offset : (float, float, float)
+        World coordinates of the fold's and the lattice's origin.
+    noise : float
+        Standard deviation added to each folded coordinate, in block sides; the truth has none.
+    missing : float
+        Share of the blocks left out at random.
+    seed : int
+        Of noise and missing blocks.
+    pin : float or None
+        Heading, degrees, at which layers do not slip; None for the mean heading.
+    origin : float
+        Arc length whose mid-surface point is the origin.
+    refold : Profile or None
+        A second fold, about the axis across the first one.  No exact flattening exists then;
+        the truth keeps volume, not lengths.
+
+    Raises
+    ------
+    OptionError
+        A value outside its valid ones.
+    """
+
+    description: str
+    profile: Profile
+    length: float
+    width: float
+    thickness: Thickness | float
+    outline: tuple[Region, ...] = ()
+    steps: tuple[float, float, float] = (10.0, 10.0, 10.0)
+    grid: str = "after"
+    azimuth: float = 0.0
+    plunge: float = 0.0
+    tilt: float = 0.0
+    lattice_bearing: float = 0.0
+    lattice_plunge: float = 0.0
+    lattice_dip: float = 0.0
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    noise: float = 0.0
+    missing: float = 0.0
+    seed: int = 0
+    pin: float | None = None
+    origin: float = 0.0
+    refold: Profile | None = None
+
+    def __post_init__(self) -> None:
+        require_positive("length", self.length)
+        require_positive("width", self.width)
+        self._check_triples()
+        for name in ("azimuth", "plunge", "tilt", "noise", "missing", "origin"):
+            require_finite(name, getattr(self, name))
+        for name in ("lattice_bearing", "lattice_plunge", "lattice_dip"):
+            require_finite(name, getattr(self, name))
+        if self.grid not in GRIDS:
+            raise OptionError(f"grid {self.grid!r} is not one of: {', '.join(GRIDS)}")
+        if self.noise < 0:
+            raise OptionError(f"noise must not be negative, but is {self.noise!r}")
+        if not 0 <= self.missing < 1:
+            raise OptionError(f"missing is a share and must lie in [0, 1), not {self.missing!r}")
+        if self.pin is not None:
+            require_finite("pin", self.pin)
+        if not isinstance(self.seed, int) or self.seed < 0:
+            raise OptionError(f"seed must be a whole number from 0 up, not {self.seed!r}")
+        self._check_parts()
+
+    def _check_parts(self) -> None:
+        for name in ("profile", "refold"):
+            value = getattr(self, name)
+            if not (isinstance(value, Profile) or (name == "refold" and value is None)):
+                raise OptionError(f"{name} must be a Profile, not {value!r}")
+        if not hasattr(self.thickness, "heights"):
+            require_positive("thickness", self.thickness)
+        if not all(hasattr(region, "keeps") for region in self.outline):
+            raise OptionError(f"outline must be a tuple of regions, not {self.outline!r}")
+
+    def _check_triples(self) -> None:
+        for name in ("steps", "offset"):
+            values = getattr(self, name)
+            if np.shape(values) != (3,):
+                raise OptionError(f"{name} must be three numbers, not {values!r}")
+            for value in values:
+                (require_positive if name == "steps" else require_finite)(name, value)
+
+    @property
+    def shape(self) -> Thickness:
+        """The thickness as heights of bottom and top."""
+        if isinstance(self.thickness, (int, float)):
+            return Even(float(self.thickness))
+        return self.thickness
+
+    @property
+    def developable(self) -> bool:
+        """Whether an exact flattening exists: unless folded twice."""
+        return self.refold is None or not (self.refold.elements and self.profile.elements)
+
+    def with_options(self, **overrides: object) -> FoldSpec:
+        """Return a copy with other values of some fields, or OptionError naming the valid ones."""
+        names = [f.name for f in fields(self)]
+        for name in overrides:
+            if name not in names:
+                raise OptionError(
+                    f"unknown option {name!r} of a simulated body; valid: blocks, "
+                    + ", ".join(names)
+                )
+        return replace(self, **overrides)  # type: ignore[arg-type]
+
+    def with_blocks(self, blocks: int) -> FoldSpec:
+        """Return the body grown or shrunk in its plane to hold about so many blocks.
+
+        Length and width are scaled; sinusoids go on, bends and bumps are stretched.
+        """
+        require_positive("blocks", blocks)
+        spec = self
+        for _ in range(3):
+            factor = float(np.sqrt(blocks * np.prod(spec.steps) / _volume(spec)))
+            spec = replace(
+                spec,
+                length=spec.length * factor,
+                width=spec.width * factor,
+                profile=spec.profile.stretched(factor),
+                refold=spec.refold and spec.refold.stretched(factor),
+            )
+        return spec
+
+
+def _volume(spec: FoldSpec) -> float:
+    """Return the body's volume, by the midpoint rule over the sheet."""
+    n = 400
+    a, b = ((g.ravel() + 0.5) / n for g in np.meshgrid(*[np.arange(n)] * 2, indexing="ij"))
+    low, high = spec.shape.heights(a, b)
+    thick = np.where(_kept(spec, a * spec.length, b * spec.width, np.zeros(len(a))), high - low, 0)
+    volume = float(thick.mean() * spec.length * spec.width)
+    if volume <= 0:
+        raise OptionError("the outline leaves nothing of the body")
+    return volume
+
+
+def _kept(spec: FoldSpec, u: Floats, v: Floats, w: Floats) -> Bools:
+    """Return which points, (n,), lie in the rectangle and in all regions of the outline."""
+    place = Place(u, v, w, spec.length, spec.width)
+    out: Bools = (u >= 0) & (u <= spec.length) & (v >= 0) & (v <= spec.width)
+    for region in spec.outline:
+        out &= region.keeps(place)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """The geometry of a simulated body: the exact map between its truth and the world.
+
+    Truth coordinates are (u, v, w): across the fold axis, along it, and up the layer's normal;
+    local ones (x, y, z) are folded, before the fold is turned and moved into the world.
+
+    Raises
+    ------
+    OptionError
+        When made: a hinge tighter than the sheet is thick, or limbs that overlap.
+    """
+
+    spec: FoldSpec
+
+    def __post_init__(self) -> None:
+        self._check_hinges(self.slip, self.spec.shape)
+        if self.second is not None:
+            self._check_hinges(self.second, Even(2 * self.second.reach))
+        self._check_overlap()
+
+    @cached_property
+    def axes(self) -> Floats:
+        """The fold's axes x, y, z as rows, (3, 3), in world coordinates."""
+        return rotation(self.spec.azimuth, self.spec.plunge, self.spec.tilt)
+
+    @cached_property
+    def lattice_axes(self) -> Floats:
+        """The lattice's axes as rows, (3, 3), in world coordinates."""
+        s = self.spec
+        if s.grid == "before":
+            return self.axes
+        return rotation(s.lattice_bearing, s.lattice_plunge, s.lattice_dip)
+
+    @cached_property
+    def slip(self) -> FlexuralSlip:
+        """The fold's section, between (u, w) and (x, z)."""
+        s = self.spec
+        pin = None if s.pin is None else float(np.radians(s.pin))
+        return FlexuralSlip(s.profile, s.length, s.shape.reach(), pin, s.origin)
+
+    @cached_property
+    def second(self) -> FlexuralSlip | None:
+        """The second fold's section, between (v, z) and (y, z), or None."""
+        if self.spec.refold is None:
+            return None
+        z = np.stack([self._section(side)[:, 1] for side in (-1, 1)])
+        return FlexuralSlip(
+            self.spec.refold, self.spec.width, float(np.abs(z - self._middle).max()) * 1.001
+        )
+
+    @cached_property
+    def _middle(self) -> float:
+        """Height of the second fold's mid surface."""
+        z = np.stack([self._section(side)[:, 1] for side in (-1, 1)])
+        return float((z.max() + z.min()) / 2)
+
+    def _section(self, side: int) -> Floats:
+        """Return points (x, z) of the section along the sheet at its reach."""
+        u = np.linspace(0, self.spec.length, 2001)
+        return self.slip.fold(u, np.full(len(u), side * self.slip.reach))
+
+    def inside(self, truth: Floats) -> Bools:
+        """Return which points (n, 3) in truth coordinates lie in the body."""
+        u, v, w = truth.T
+        low, high = self.heights(u, v)
+        out: Bools = _kept(self.spec, u, v, w) & (w >= low) & (w <= high)
+        return out
+
+    def heights(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Return heights w of bottom and top, (n,) each, over points of the sheet."""
+        return self.spec.shape.heights(u / self.spec.length, v / self.spec.width)
+
+    def fold(self, truth: Floats) -> Floats:
+        """Return world coordinates (n, 3) of points (n, 3) in truth coordinates."""
+        return self.to_world(self.fold_local(truth))
+
+    def unfold(self, points: Floats) -> tuple[Floats, Bools]:
+        """Return truth coordinates (n, 3) of world points, and which points have them.
+
+        A point out of the sheet's reach is marked False and its row holds zeros.
+        """
+        offset = np.asarray(self.spec.offset, float)
+        return self.unfold_local((points - offset) @ self.axes.T)
+
+    def to_world(self, local: Floats) -> Floats:
+        """Return world coordinates of local ones, (n, 3)."""
+        out: Floats = local @ self.axes + np.asarray(self.spec.offset, float)
+        return out
+
+    def fold_local(self, truth: Floats) -> Floats:
+        """Return local coordinates (n, 3) of points (n, 3) in truth coordinates."""
+        xz = self.slip.fold(truth[:, 0], truth[:, 2])
+        return self.refold(np.stack([xz[:, 0], truth[:, 1], xz[:, 1]], axis=1))
+
+    def refold(self, local: Floats) -> Floats:
+        """Return local points (n, 3) after the second fold, if there is one."""
+        if self.second is None:
+            return local
+        yz = self.second.fold(local[:, 1], local[:, 2] - self._middle)
+        return np.column_stack([local[:, 0], yz])
+
+    def unfold_local(self, local: Floats) -> tuple[Floats, Bools]:
+        """Return truth coordinates (n, 3) of local points, and which points have them."""
+        found = np.ones(len(local), bool)
+        if self.second is not None:
+            vz, found = self.second.unfold(local[:, 1:])
+            local = np.column_stack([local[:, 0], vz[:, 0], vz[:, 1] + self._middle])
+        uw, reached = self.slip.unfold(local[:, [0, 2]])
+        found = found & reached
+        truth = np.stack([uw[:, 0], local[:, 1], uw[:, 1]], axis=1)
+        truth[~found] = 0
+        return truth, found
+
+    def boundary(self, n: int = 200, m: int = 9) -> Floats:
+        """Return truth coordinates (2 n m, 3) of bottom and top over the whole rectangle."""
+        u, v = np.meshgrid(
+            np.linspace(0, self.spec.length, n), np.linspace(0, self.spec.width, m), indexing="ij"
+        )
+        low, high = self.heights(u.ravel(), v.ravel())
+        sides = [np.stack([u.ravel(), v.ravel(), w], axis=1) for w in (low, high)]
+        return np.concatenate(sides)
+
+    def _check_hinges(self, slip: FlexuralSlip, shape: Thickness) -> None:
+        """Raise OptionError where the sheet reaches a centre of curvature."""
+        s = slip.knots[:: max(1, len(slip.knots) // 4000), None]
+        t = slip.reach * np.linspace(-1, 1, 17)
+        curvature = slip.profile.curvature(s)
+        tight = 1 - t * curvature <= 0
+        a = (s - t * (slip.profile.heading(s) - slip.still)) / slip.length
+        tight &= (a >= 0) & (a <= 1)
+        rows, columns = np.nonzero(tight)
+        for b in np.linspace(0, 1, 9):
+            low, high = shape.heights(a[rows, columns], np.full(len(rows), b))
+            hit = rows[(t[columns] >= low) & (t[columns] <= high)]
+            if len(hit):
+                k = hit[np.argmax(np.abs(curvature[hit, 0]))]
+                raise OptionError(
+                    f"the hinge at arc length {s[k, 0]:.4g} has radius "
+                    f"{1 / np.abs(curvature[k, 0]):.4g}, within the body's half-thickness there; "
+                    "open the hinge or thin the body"
+                )
+
+    def _check_overlap(self) -> None:
+        """Raise OptionError where the folded sheet covers itself."""
+        truth = self.boundary()
+        back, found = self.unfold_local(self.fold_local(truth))
+        off = np.abs(back - truth).max(axis=1) > 1e-6 * self.spec.length
+        if not found.all() or off.any():
+            u, v, w = truth[np.flatnonzero(~found | off)[0]]
+            raise OptionError(
+                f"the folded body covers itself near u = {u:.4g}, v = {v:.4g}, w = {w:.4g}; "
+                "lower the headings, spread the hinges or thin the body"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A simulated body: blocks folded and before folding.
+
+    Attributes
+    ----------
+    name : str
+    folded : (n, 3) float
+        Block centroids as a block model would give them, world coordinates.
+    truth : (n, 3) float
+        The same blocks before folding: u across the fold axis, v along it, w height above the
+        mid surface.  The frame is right-handed and w grows towards the top: never mirrored.
+    bottom, top : (n,) float
+        Heights w of the body's surfaces below and above each block.
+    steps : (3,) float
+        Block sides along the lattice's axes.
+    sheet : Sheet
+        The exact map, for any other points.
+    """
+
+    name: str
+    folded: Floats
+    truth: Floats
+    bottom: Floats
+    top: Floats
+    steps: Floats
+    sheet: Sheet
+
+    def __iter__(self) -> Iterator[Floats]:
+        """Unpack as ``X, W``: the folded points and their truth."""
+        return iter((self.folded, self.truth))
+
+    @property
+    def description(self) -> str:
+        """One line that says what the body is."""
+        return self.sheet.spec.description
+
+    @property
+    def developable(self) -> bool:
+        """Whether an exact flattening exists."""
+        return self.sheet.spec.developable
+
+    @property
+    def stratigraphic(self) -> Floats:
+        """True stratigraphic coordinate (n,): 0 at the bottom, 1 at the top."""
+        out: Floats = (self.truth[:, 2] - self.bottom) / (self.top - self.bottom)
+        return out
+
+    def frame(self, decimals: int | None = None) -> pd.DataFrame:
+        """Return a table: centroid_x/y/z, true_x/y/z; a row per block, rounded on request."""
+        data = {f"centroid_{c}": self.folded[:, i] for i, c in enumerate("xyz")}
+        data.update({f"true_{c}": self.truth[:, i] for i, c in enumerate("xyz")})
+        table = pd.DataFrame(data)
+        return table if decimals is None else table.round(decimals) + 0.0
+
+    def horizon(self, side: str, spacing: float) -> tuple[TriMesh, Floats]:
+        """Return the exact top or bottom surface on a grid, folded, and its truth (n, 3).
+
+        Parameters
+        ----------
+        side : {'top', 'bottom'}
+        spacing : float
+            Edge length before folding.  Triangles that leave the outline are dropped; normals
+            point up the sheet.
+        """
+        if side not in ("top", "bottom"):
+            raise OptionError(f"side {side!r} is not one of: top, bottom")
+        require_positive("spacing", spacing)
+        spec = self.sheet.spec
+        n, m = (max(2, round(x / spacing) + 1) for x in (spec.length, spec.width))
+        u, v = np.meshgrid(
+            np.linspace(0, spec.length, n), np.linspace(0, spec.width, m), indexing="ij"
+        )
+        heights = self.sheet.heights(u.ravel(), v.ravel())
+        truth = np.stack([u.ravel(), v.ravel(), heights[side == "top"]], axis=1)
+        kept = _kept(spec, *truth.T) & (heights[1] > heights[0])
+        k = np.arange(len(truth)).reshape(n, m)
+        p, q, r, s = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
+        F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
+        mesh, old = TriMesh(self.sheet.fold(truth), F).submesh(kept[F].all(axis=1))
+        return mesh, truth[old]

@@ -5,18 +5,24 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from geounfold.cli.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, read_points, read_surface, write_json
 from geounfold.io.coordinates import Triple, parse_columns
-from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
+from geounfold.io.surfaces import MESH_ENDINGS
+from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
     from geounfold.mapping import Carried
+    from geounfold.mesh import TriMesh
     from geounfold.options import UnfoldOptions
+    from geounfold.pipeline import Unfolding
 
 _JSON = (".json",)
 _MAP = (".npz",)
@@ -100,15 +106,26 @@ def compare(args: Namespace, console: Console) -> None:
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)}, [args.points], overwrite=args.overwrite
     )
-    table = _read(args.points, args, console)
+    surfaces = _surfaces(args, console)
     from geounfold import comparison
 
     names = [name.strip() for name in args.flatteners.split(",")]
     console.stage("comparing flatteners")
-    frame = comparison.compare(table.points, flatteners=None if names == ["all"] else names)
+    frame = comparison.compare(surfaces, "all" if names == ["all"] else names)
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
     console.done(f"{len(frame)} rows written into {args.output}")
+
+
+def _surfaces(args: Namespace, console: Console) -> dict[str, TriMesh]:
+    """Return the surface of a mesh file, or those of a body: top, bottom and mid."""
+    if ending(Path(args.points)) in MESH_ENDINGS:
+        return {"surface": read_surface(args.points)}
+    table = _read(args.points, args, console)
+    from geounfold import pipeline
+
+    result = pipeline.unfold(table.points, _options(args), progress=console.stage)
+    return {name: pair.folded for name, pair in result.surfaces.items()}
 
 
 def quality(args: Namespace, console: Console) -> None:
@@ -165,18 +182,53 @@ def simulate(args: Namespace, console: Console) -> None:
 
 
 def view(args: Namespace, console: Console) -> None:
-    """Draw a table of points into a picture."""
+    """Draw a saved map's control mesh, or points: folded and unfolded where a table has both."""
     outputs = Outputs.planned(
         {"--output": (args.output, _PICTURE)}, [args.points], overwrite=args.overwrite
     )
-    table = _read(args.points, args, console)
-    values = None if args.colour is None else table.numbers(args.colour)
+    if ending(Path(args.points)) in _MAP:
+        if args.colour is not None:
+            raise OptionError("--colour needs a table of points, not a map")
+        existing_file(Path(args.points))
+        picture = _draw_map(args.points, console)
+    else:
+        picture = _draw_points(_read(args.points, args, console), args.colour, console)
+    with outputs.writing() as parts:
+        parts["--output"].write_bytes(picture)
+    console.done(f"drawn into {args.output}")
+
+
+def _draw_map(path: str, console: Console) -> bytes:
+    """Return a picture of a saved map's control mesh in both spaces."""
+    from geounfold import mapping, plotting
+
+    control = mapping.load(path).control
+    console.stage("drawing")
+    return plotting.png(plotting.draw_control(control))
+
+
+def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
+    """Return a picture of points, coloured by a column or by height."""
+    label = colour or table.columns[2]
+    values = table.numbers(label)
+    if not np.isfinite(values).all():
+        missing = np.flatnonzero(~np.isfinite(values))
+        raise InputError(
+            f"{table.source}: column '{label}' has {len(missing)} missing or infinite values, "
+            f"the first in data row {missing[0] + 1}; choose a column that every row has"
+        )
+    twin = table.points
+    if set(_UNFOLDED) <= set(table.frame.columns):
+        twin = np.column_stack([table.numbers(name) for name in _UNFOLDED])
     from geounfold import plotting
 
     console.stage("drawing")
-    with outputs.writing() as parts:
-        plotting.draw_points(parts["--output"], table.points, values=values, label=args.colour)
-    console.done(f"drawn into {args.output}")
+    if twin is table.points:
+        image = plotting.render_body(twin, values, plotting.colour_limits(values))
+        stream = BytesIO()
+        plotting.require("matplotlib.image").imsave(stream, image, format="png")
+        return stream.getvalue()
+    return plotting.png(plotting.draw_bodies(table.points, twin, values, label))
 
 
 def _given(*paths: str | None) -> list[str]:
@@ -208,7 +260,7 @@ def _read_samples(args: Namespace, console: Console) -> PointTable | None:
     return table
 
 
-def _columns(names: Triple, mapped: Carried) -> dict[str, Any]:
+def _columns(names: Triple, mapped: Carried | Unfolding) -> dict[str, Any]:
     """Return where points came to lie, by output column."""
     points = {name: mapped.points[:, axis] for axis, name in enumerate(names)}
     return {**points, "stratigraphic": mapped.stratigraphic, "location": mapped.location}
@@ -216,7 +268,7 @@ def _columns(names: Triple, mapped: Carried) -> dict[str, Any]:
 
 def _options(args: Namespace) -> UnfoldOptions:
     """Return the options that were given; the pipeline knows the others."""
-    from geounfold.pipeline import UnfoldOptions
+    from geounfold.options import UnfoldOptions
 
     readers: dict[str, Callable[[str], Any]] = {
         "up": _direction,
@@ -239,13 +291,9 @@ def _direction(text: str) -> tuple[float, float, float]:
 def _body(text: str) -> int | str:
     if text == "all":
         return text
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise OptionError(f"--body needs the number of a body (1, 2, ...) or all, not '{text}'")
-    return number
+    if not text.isdecimal():
+        raise OptionError(f"--body needs the number of a body, or all, not '{text}'")
+    return int(text)
 
 
 def _count(text: str | None, option: str) -> int | None:

@@ -209,12 +209,17 @@ def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(
         commands, "compare", "try every flattener on the same surfaces of a body", common
     )
-    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_TABLES}")
+    parser.add_argument(
+        "points",
+        metavar="POINTS",
+        help=f"block centroids: {_TABLES}; or one surface: .ply, .obj, .stl or .off",
+    )
     parser.add_argument("-o", "--output", metavar="TABLE", required=True, help=_TABLES)
     parser.add_argument(
         "--flatteners", metavar="A,B,...", default="all", help="which ones (default all)"
     )
     _add_columns(parser)
+    _add_model(parser)
 
 
 def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -246,10 +251,10 @@ def _add_simulate(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def _add_view(commands: Any, common: argparse.ArgumentParser) -> None:
-    parser = _add_command(
-        commands, "view", "draw points, folded or unfolded, into a picture", common
+    parser = _add_command(commands, "view", "draw points or a saved map into a picture", common)
+    parser.add_argument(
+        "points", metavar="FILE", help=f"{_TABLES}, or a map .npz; an output shows both spaces"
     )
-    parser.add_argument("points", metavar="POINTS", help=_TABLES)
     parser.add_argument("-o", "--output", metavar="PICTURE.png", required=True)
     parser.add_argument("--colour", metavar="COLUMN", help="colour by a column of numbers")
     _add_columns(parser)

@@ -11,6 +11,7 @@ import pandas as pd
 
 from geounfold.errors import InputError, OptionError
 from geounfold.io._text import counted, listing, shown
+from geounfold.io.tables import objects
 from geounfold.mesh import Floats
 
 Triple = tuple[str, str, str]
@@ -170,7 +171,7 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
         raise InputError(f"{source}: column '{name}' is not numeric: it holds {kind}")
     if pd.api.types.is_numeric_dtype(kind):
         return np.asarray(column.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
-    text = column.to_numpy(dtype=object, na_value="")
+    text = objects(column)
     try:
         values = text.astype(np.float64)
     except (TypeError, ValueError):

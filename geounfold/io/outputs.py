@@ -69,7 +69,7 @@ class Outputs:
             for name, (path, endings) in wanted.items()
             if path is not None
         }
-        sources = [Path(p).resolve() for p in inputs]
+        sources = [Path(p) for p in inputs]
         for name, target in targets.items():
             twin = next((n for n in targets if n != name and _same(targets[n], target)), None)
             if twin is not None:
@@ -156,11 +156,9 @@ def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
 
 def _same(a: Path, b: Path) -> bool:
     """Return whether two paths lead to one file (hard links included)."""
-    if a == b:
-        return True
     try:
-        return a.samefile(b)
-    except OSError:
+        return a.resolve() == b.resolve() or a.samefile(b)
+    except (OSError, ValueError, RuntimeError):  # the second is missing or no path at all
         return False
 
 

@@ -206,6 +206,15 @@ def _read_parquet(path: Path) -> Table:
     return Table(frame, text=False)
 
 
+def objects(column: pd.Series) -> np.ndarray:
+    """Return a column's values as Python objects, (n,); missing ones are empty strings."""
+    values = np.array(column.to_numpy(dtype=object))
+    missing = column.isna().to_numpy(dtype=bool)
+    if missing.any():
+        values[missing] = ""
+    return values
+
+
 def with_columns(frame: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
     """Return the frame with columns added at its end; one of the same name is replaced in place.
 
@@ -275,9 +284,9 @@ def _csv_text(frame: pd.DataFrame) -> str:
 
 def _fields(column: pd.Series) -> list[str]:
     """Return a column's values as CSV fields."""
-    values = column.to_numpy(dtype=object, na_value="").tolist()
+    values = objects(column).tolist()
     if pd.api.types.is_float_dtype(column.dtype):
-        return ["" if v == "" or v != v else repr(v) for v in values]  # NaN equals nothing
+        return ["" if v == "" else repr(v) for v in values]
     return _quoted([str(v) for v in values])
 
 
@@ -313,11 +322,9 @@ def _typed(column: pd.Series) -> pd.Series:
         integers[~blank] = filled.astype(np.int64)
         integers[blank] = pd.NA
         return integers
-    if filled.str.fullmatch(r"[+-]?(?:0|[1-9]\d*)?\.?\d*(?:[eE][+-]?\d+)?").all():
-        try:
-            return words.where(~blank, "nan").astype(np.float64)
-        except ValueError:  # a lone sign or point
-            return column
+    whole, fraction = r"(?:0|[1-9]\d{0,14})", r"(?:[eE][+-]?\d+)?"
+    if filled.str.fullmatch(rf"[+-]?(?:{whole}(?:\.\d*)?|\.\d+){fraction}").all():
+        return words.where(~blank, "nan").astype(np.float64)
     return column
 
 

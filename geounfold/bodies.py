@@ -366,22 +366,44 @@ def _connected_cells(cells: _Cells) -> Ints:
     return _connected(a, b, len(sizes))[labels]
 
 
-def _connected_points(X: Floats) -> Ints:
-    """Return component labels of scattered points (see separate_bodies)."""
+def _connected_points(points: Floats) -> Ints:
+    """Return component labels of scattered points (see separate_bodies).
+
+    The nearest few neighbours make the first components; farther ones only join those.
+    """
+    order = np.asarray(cKDTree(points).indices, dtype=np.int64)
+    X = points[order]  # neighbours in space are neighbours in memory: three times as fast
     tree = cKDTree(X)
     distance, near = _neighbours(tree, X, _NEAR)
     reach = np.minimum(distance[:, -1], _CAP * np.median(distance[:, -1]))
-    reach_of_pair = np.maximum(reach[:, None], reach[near])
-    row, column = np.nonzero(distance <= reach_of_pair)
-    labels = _connected(row, near[row, column], len(X))
+    labels = np.arange(len(X))
+    for part in (slice(1, 5), slice(5, None)):
+        labels = _joined(labels, labels, near[:, part], distance[:, part], reach, reach)
     sizes = np.bincount(labels)
     rest = np.flatnonzero(labels != sizes.argmax())
-    if len(rest) == 0:
-        return labels
-    distance, near = _neighbours(tree, X[rest], _WIDE)
-    reach_of_pair = _REACH * np.maximum(reach[rest][:, None], reach[near])
-    row, column = np.nonzero(distance <= reach_of_pair)
-    return _connected(labels[rest[row]], labels[near[row, column]], len(sizes))[labels]
+    if len(rest):
+        distance, near = _neighbours(tree, X[rest], _WIDE)
+        wide = _REACH * reach
+        labels = _joined(labels, labels[rest], near, distance, wide[rest], wide)
+    out = np.empty_like(labels)
+    out[order] = labels
+    return out
+
+
+def _joined(
+    labels: Ints, own: Ints, near: Ints, distance: Floats, own_reach: Floats, reach: Floats
+) -> Ints:
+    """Return labels with the components joined that neighbours within reach connect.
+
+    Rows of ``near`` and ``distance`` belong to points labelled ``own`` that reach
+    ``own_reach``; two points connect when either reaches the other.
+    """
+    other = labels[near]
+    row, column = np.nonzero(other != own[:, None])
+    target = near[row, column]
+    close = distance[row, column] <= np.maximum(own_reach[row], reach[target])
+    row, target = row[close], target[close]
+    return _connected(own[row], labels[target], int(labels.max()) + 1)[labels]
 
 
 def _by_size(labels: Ints, points: Floats) -> Ints:

@@ -208,6 +208,7 @@ def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
 
 def _cloud_frame(points: Floats) -> Frame:
     """Principal axes, origin at the mean, unit at the typical spacing."""
+    scale = point_spacing(points)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     origin = middle + (points - middle).mean(axis=0)
     X = points - origin
@@ -221,7 +222,7 @@ def _cloud_frame(points: Floats) -> Frame:
         turns += [sign @ in_plane for sign in _SIGNS]
         tables += [_turned(table, sign) for sign in _SIGNS]
     turn = _greatest(np.array(turns), np.array(tables), axes)
-    return Frame(origin=origin, rotation=turn @ axes, scale=point_spacing(points), steps=None)
+    return Frame(origin=origin, rotation=turn @ axes, scale=scale, steps=None)
 
 
 def _by_variance(X: Floats, turns: Floats) -> Floats:

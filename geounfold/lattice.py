@@ -264,8 +264,8 @@ def _peak(groups: list[Floats]) -> Floats | None:
     if len(V) < 4:
         return None
     V = np.concatenate([V, -V])
-    gap = np.linalg.norm(V[:, None] - V[None], axis=2)
-    near = gap < 0.05 * np.linalg.norm(V, axis=1)[:, None]
+    square = np.einsum("ij,ij->i", V, V)
+    near = square[:, None] + square - 2 * V @ V.T < 0.05**2 * square[:, None]
     count = near.sum(axis=1)
     if count.max() < 4:
         return None

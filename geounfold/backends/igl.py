@@ -5,6 +5,7 @@ from __future__ import annotations
 import igl
 import numpy as np
 
+from geounfold.errors import BackendError
 from geounfold.mesh import Bools, Floats, Ints
 
 
@@ -164,3 +165,66 @@ def pinched_vertices(F: Ints) -> Ints:
     manifold = igl.is_vertex_manifold(_i(F))
     flags = np.asarray(manifold[1] if isinstance(manifold, tuple) else manifold)
     return np.setdiff1d(np.flatnonzero(~flags.ravel()), np.setdiff1d(np.arange(len(flags)), F))
+
+
+def lscm(V: Floats, F: Ints, fixed: Ints, uv_fixed: Floats) -> Floats:
+    """Return the least-squares conformal map (n, 2) with the vertices ``fixed`` at ``uv_fixed``.
+
+    Raises
+    ------
+    BackendError
+        libigl refused, or returned something that is not finite.
+    """
+    try:
+        uv, _ = igl.lscm(_f(V), _i(F), _i(fixed), _f(uv_fixed))
+    except RuntimeError as err:
+        msg = f"libigl's lscm failed: {err}"
+        raise BackendError(msg) from err
+    return _finite(np.asarray(uv, dtype=np.float64), len(V), "lscm")
+
+
+class ArapSteps:
+    """libigl's as-rigid-as-possible parameterisation, one local-global step at a time.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices.
+    F : (m, 3) int
+        Triangles.
+    """
+
+    def __init__(self, V: Floats, F: Ints) -> None:
+        self._data = igl.ARAPData()
+        self._data.max_iter = 1
+        self._n = len(V)
+        # libigl refuses an empty list of fixed vertices: vertex 0 is held at the origin.
+        try:
+            igl.arap_precomputation(_f(V), _i(F), 2, np.zeros(1, dtype=np.int32), self._data)
+        except RuntimeError as err:
+            msg = f"libigl's arap_precomputation failed: {err}"
+            raise BackendError(msg) from err
+
+    def __call__(self, uv: Floats) -> Floats:
+        """Return the positions after one step, (n, 2), vertex 0 at the origin.
+
+        Raises
+        ------
+        BackendError
+            libigl refused, or returned something that is not finite.
+        """
+        try:
+            # libigl moves the held vertex alone to its place, so all are shifted with it.
+            after = igl.arap_solve(np.zeros((1, 2)), self._data, _f(uv - uv[0]))
+        except RuntimeError as err:
+            msg = f"libigl's arap_solve failed: {err}"
+            raise BackendError(msg) from err
+        return _finite(np.asarray(after, dtype=np.float64), self._n, "arap_solve")
+
+
+def _finite(uv: Floats, n: int, name: str) -> Floats:
+    """Return uv, or BackendError where it is not (n, 2) and finite (libigl issue 2439)."""
+    if uv.shape != (n, 2) or not np.isfinite(uv).all():
+        msg = f"libigl's {name} returned positions that are not finite"
+        raise BackendError(msg)
+    return uv

@@ -12,12 +12,26 @@ from numpy.typing import ArrayLike
 from geounfold.errors import OptionError
 from geounfold.flattening._problem import Problem, make_problem
 from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening.arap import ArapOptions, arap
 from geounfold.flattening.initial import check_disk
 from geounfold.flattening.initial import tutte as _tutte
+from geounfold.flattening.lscm import LscmOptions, lscm
 from geounfold.flattening.spring import SpringOptions, spring
+from geounfold.flattening.spring_dynamic import SpringDynamicOptions, spring_dynamic
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 
-__all__ = ["FLATTENERS", "Flattener", "Flattening", "SpringOptions", "Stop", "flatten", "tutte"]
+__all__ = [
+    "FLATTENERS",
+    "ArapOptions",
+    "Flattener",
+    "Flattening",
+    "LscmOptions",
+    "SpringDynamicOptions",
+    "SpringOptions",
+    "Stop",
+    "flatten",
+    "tutte",
+]
 
 
 @dataclass(frozen=True)
@@ -44,7 +58,13 @@ class Flattener:
 
 #: The methods by name.
 FLATTENERS: dict[str, Flattener] = {
-    f.name: f for f in (Flattener("spring", spring, True, SpringOptions),)
+    f.name: f
+    for f in (
+        Flattener("spring", spring, True, SpringOptions),
+        Flattener("spring_dynamic", spring_dynamic, True, SpringDynamicOptions),
+        Flattener("arap", arap, False, ArapOptions),
+        Flattener("lscm", lscm, False, LscmOptions),
+    )
 }
 
 

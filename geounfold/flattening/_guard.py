@@ -8,7 +8,7 @@ from geounfold.geometry import cross2, triangle_areas
 from geounfold.mesh import Floats, Ints
 
 #: Area ratio below which the barrier acts.
-REACH = 0.3
+REACH = 0.9
 
 #: Share of the way to the first folded triangle that a step may go.
 SHARE = 0.9

@@ -55,7 +55,7 @@ def make_problem(mesh: TriMesh, loops: tuple[Ints, ...], rest: Floats | None) ->
     edges = unique_edges(mesh.F)
     own = lengths(mesh.V, edges)
     wanted = own if rest is None else np.array(rest, dtype=np.float64)
-    corners = _lay_out(wanted[_edge_of_side(mesh.F, edges, len(mesh.V))])
+    corners = lay_out(wanted[edge_of_side(mesh.F, edges, len(mesh.V))])
     if rest is None:
         areas = triangle_areas(mesh.V, mesh.F)
     else:
@@ -64,7 +64,7 @@ def make_problem(mesh: TriMesh, loops: tuple[Ints, ...], rest: Floats | None) ->
     return Problem(mesh, loops, edges, wanted, corners, areas, 2 * float(radius))
 
 
-def _edge_of_side(F: Ints, edges: Ints, n: int) -> Ints:
+def edge_of_side(F: Ints, edges: Ints, n: int) -> Ints:
     """Return the edge opposite each corner of each face, (m, 3), as a row of ``edges``."""
     a, b = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
     key = np.minimum(a, b) * n + np.maximum(a, b)
@@ -72,7 +72,7 @@ def _edge_of_side(F: Ints, edges: Ints, n: int) -> Ints:
     return out
 
 
-def _lay_out(sides: Floats) -> Complex:
+def lay_out(sides: Floats) -> Complex:
     """Return triangles (m, 3) in the complex plane from the sides opposite their corners."""
     a, b, c = sides.T
     # Differences of sides, not of squares: exact to rounding on needles (Kahan).

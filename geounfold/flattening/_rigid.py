@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from geounfold.flattening._linear import incidence, pinned_solver
-from geounfold.flattening._problem import Problem
+from geounfold.flattening._problem import Problem, flip_count
 from geounfold.mesh import Floats, Ints
 
 
@@ -49,3 +49,23 @@ class RigidSteps:
         out = self._solve(np.column_stack([load.real, load.imag]))
         centred: Floats = out - out.mean(axis=0)
         return centred
+
+
+def relax(
+    step: RigidSteps, uv: Floats, problem: Problem, tol: float, max_iter: int
+) -> tuple[Floats, Floats | None, int]:
+    """Return the positions after some steps, the last ones without flips, and the steps taken.
+
+    Steps end where none moves a vertex by more than ``tol`` of the surface's size.
+    """
+    F = problem.mesh.F
+    unfolded = None if flip_count(uv, F) else uv
+    for count in range(1, max_iter + 1):
+        after = step(uv)
+        moved = float(np.abs(after - uv).max())
+        uv = after
+        if flip_count(uv, F) == 0:
+            unfolded = uv
+        if moved <= tol * problem.size:
+            return uv, unfolded, count
+    return uv, unfolded, max_iter

@@ -13,7 +13,7 @@ from geounfold.flattening._guard import FoldGuard
 from geounfold.flattening._linear import factor, incidence, pinned_solver, preconditioned_solve
 from geounfold.flattening._problem import History, Problem, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening._rigid import RigidSteps
+from geounfold.flattening._rigid import RigidSteps, relax
 from geounfold.flattening._springs import (
     BlockPattern,
     spring_blocks,
@@ -29,6 +29,9 @@ ARMIJO = 1e-4
 
 #: Halvings of a step before the search gives up.
 HALVINGS = 30
+
+#: Newton steps after which folded triangles end a run that has no barrier.
+PATIENCE = 12
 
 #: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard where a vertex
 #: and its neighbours lie on one line.
@@ -106,7 +109,8 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
     system = _System(problem, place)
     history = History.empty(problem)
     history.record(first, options.stiffness * system.energy(first))
-    uv, steps, stop = _descend(system, warm, options, history)
+    patience = PATIENCE if options.guard else options.max_iter
+    uv, steps, stop = _descend(system, warm, options, history, patience)
     if not np.isfinite(uv).all():
         raise FlatteningError("spring: the flat positions are not finite")
     flips = flip_count(uv, problem.mesh.F)
@@ -137,7 +141,7 @@ def _guarded(
             raise FlatteningError("spring: no start without flipped triangles was found")
     history = History.empty(problem)
     system = _System(problem, place, FoldGuard(problem.mesh.F, problem.areas))
-    uv, steps, stop = _descend(system, unfolded, options, history)
+    uv, steps, stop = _descend(system, unfolded, options, history, options.max_iter)
     note = f"the springs alone fold {flips} triangles over: redone with a barrier against folding"
     return finish(problem, uv, "spring", stop, before + steps, history, note)
 
@@ -152,17 +156,9 @@ def _warm_start(
     if np.sqrt(np.mean(strain * strain)) <= options.warm_strain or not options.warm_max_iter:
         gradient = incidence(problem.edges, n)
         return start, unfolded, 0, pinned_solver((gradient.T @ gradient).tocsc())[1]
-    rigid, uv, steps = RigidSteps(problem), start, 0
-    while steps < options.warm_max_iter:
-        steps += 1
-        after = rigid(uv)
-        moved = float(np.abs(after - uv).max())
-        uv = after
-        if flip_count(uv, F) == 0:
-            unfolded = uv
-        if moved <= options.warm_tol * problem.size:
-            break
-    return uv, unfolded, steps, rigid.place
+    rigid = RigidSteps(problem)
+    uv, flat, steps = relax(rigid, start, problem, options.warm_tol, options.warm_max_iter)
+    return uv, flat, steps, rigid.place
 
 
 class _System:
@@ -243,9 +239,12 @@ def _pin(uv: Floats, vertex: Floats, far: int) -> None:
 
 
 def _descend(
-    system: _System, uv: Floats, options: SpringOptions, history: History
+    system: _System, uv: Floats, options: SpringOptions, history: History, patience: int
 ) -> tuple[Floats, int, Stop]:
-    """Return the minimiser, the steps taken and why they ended; each step is recorded."""
+    """Return the minimiser, the steps taken and why they ended; each step is recorded.
+
+    Folded triangles end it after ``patience`` steps: springs that crumple converge slowly.
+    """
     tol, size, scale = options.tol, system.problem.size, options.stiffness
     # Energy of a strain of tol everywhere: below it, exactly developable surfaces are done.
     floor = tol**2 * float((system.problem.rest**2).sum()) / 2
@@ -260,7 +259,7 @@ def _descend(
         history.record(uv, scale * energy)
         if quiet and moved <= tol * size:
             return uv, count, Stop.CONVERGED
-        if moved == 0:
+        if moved == 0 or (count >= patience and flip_count(uv, system.problem.mesh.F)):
             return uv, count, Stop.MAX_ITER
     return uv, options.max_iter, Stop.MAX_ITER
 

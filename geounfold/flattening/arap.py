@@ -1,0 +1,79 @@
+"""As-rigid-as-possible flattening (Liu et al. 2008) by libigl."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.backends import igl as backend
+from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.flattening._problem import History, Problem, finish, flip_count
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening.initial import tutte
+from geounfold.flattening.measures import arap_energy
+from geounfold.mesh import Floats
+
+#: Steps between two entries of the history.
+RECORD = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArapOptions:
+    """Options of ``arap``.
+
+    Parameters
+    ----------
+    tol : float
+        Stop where a step moves no vertex by more than this share of the surface's size.
+    max_iter : int
+        Largest number of local-global steps.
+    """
+
+    tol: float = 1e-6
+    max_iter: int = 1000
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.tol) and self.tol > 0):
+            raise OptionError(f"arap: tol must be positive, but is {self.tol}")
+        if self.max_iter < 1:
+            raise OptionError(f"arap: max_iter must be at least 1, but is {self.max_iter}")
+
+
+def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flattening:
+    """Flatten by libigl's ARAP, ``sum A (s1 - 1)^2 + A (s2 - 1)^2`` over the faces.
+
+    libigl's ARAP does not bar triangles from flipping (libigl issue 680): flips are counted and
+    named in the note.  Positions that are not finite (issue 2439) are a FlatteningError.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface; its rest lengths are its edges' own.
+    start : (n, 2) float or None
+        Flat positions to start from; None takes Tutte's embedding.
+    options : ArapOptions
+        See there.
+    """
+    uv = tutte(problem) if start is None else start - start.mean(axis=0)
+    # A common size for every unit: libigl's solver has absolute thresholds.
+    V, F, size = problem.mesh.V, problem.mesh.F, problem.size
+    history = History.empty(problem)
+    history.record(uv, arap_energy(V, F, uv))
+    stop, count = Stop.MAX_ITER, 0
+    try:
+        step = backend.ArapSteps((V - V.mean(axis=0)) / size, F)
+        while count < options.max_iter and stop is Stop.MAX_ITER:
+            count += 1
+            after = step(uv / size) * size
+            after -= after.mean(axis=0)
+            if np.abs(after - uv).max() <= options.tol * size:
+                stop = Stop.CONVERGED
+            uv = after
+            if count % RECORD == 0 or stop is Stop.CONVERGED or count == options.max_iter:
+                history.record(uv, arap_energy(V, F, uv))
+    except BackendError as err:
+        raise FlatteningError(f"arap: {err}") from err
+    flips = flip_count(uv, F)
+    note = f"libigl's ARAP flipped {flips} triangles: it has no safeguard" if flips else ""
+    return finish(problem, uv, "arap", stop, count, history, note)

@@ -1,0 +1,212 @@
+"""Wang's spring-mass model stepped through time, as the thesis describes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.errors import FlatteningError, OptionError
+from geounfold.flattening._problem import (
+    History,
+    Problem,
+    finish,
+    flip_count,
+    relative_area_error,
+    upright,
+)
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening._rigid import RigidSteps, relax
+from geounfold.flattening._springs import spring_energy, spring_forces
+from geounfold.flattening.initial import tutte
+from geounfold.geometry import vertex_sum
+from geounfold.mesh import Floats
+
+#: Steps between two looks at the energy and displacement (and entries of the history).
+WINDOW = 50
+
+#: Values of ``stop_rule`` and ``initial``.
+STOP_RULES = ("converged", "thesis")
+INITIAL = ("relaxed", "tutte", "plane")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringDynamicOptions:
+    """Options of ``spring_dynamic``.
+
+    Parameters
+    ----------
+    stiffness : float
+        Spring constant C.
+    density : float
+        Mass of one square unit of the surface.
+    damping : float or None
+        Share of the velocity lost in each step, 0 to 1; None takes 0.01, or 0 with the
+        thesis's stop rule (its equations have no damping).
+    time_step : float or None
+        Time step; None takes the one that makes ``time_step^2 w^2 = 0.01`` for a bound ``w`` on
+        the fastest oscillation: the thesis's integrator gains energy at a rate of that product
+        over 4 per step, and the default damping takes twice as much away.
+    stop_rule : str
+        ``converged``: over 50 steps the energy changed by at most ``tol`` of itself and no
+        vertex moved more than ``tol`` of the surface's size.  ``thesis``: at the first step
+        after which neither the energy nor the area error has decreased.
+    tol : float
+        See ``stop_rule``.
+    max_iter : int
+        Largest number of time steps.
+    initial : str or None
+        Start where none is given: ``relaxed``, Tutte's embedding after a few rigid (ARAP)
+        steps; ``tutte`` itself, from which springs often fold over; ``plane``, the projection on
+        the best-fit plane as in the thesis.  None takes ``relaxed``, or ``plane`` with the
+        thesis's stop rule.
+    """
+
+    stiffness: float = 1.0
+    density: float = 1.0
+    damping: float | None = None
+    time_step: float | None = None
+    stop_rule: str = "converged"
+    tol: float = 1e-5
+    max_iter: int = 5_000
+    initial: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "density", "tol", "time_step"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise OptionError(f"spring_dynamic: {name} must be positive, but is {value}")
+        if self.damping is not None and not 0 <= self.damping < 1:
+            raise OptionError(f"spring_dynamic: damping must be in [0, 1), but is {self.damping}")
+        if self.max_iter < 1:
+            raise OptionError(
+                f"spring_dynamic: max_iter must be at least 1, but is {self.max_iter}"
+            )
+        for name, valid in (("stop_rule", STOP_RULES), ("initial", (None, *INITIAL))):
+            if getattr(self, name) not in valid:
+                names = ", ".join(str(v) for v in valid)
+                given = getattr(self, name)
+                raise OptionError(f"spring_dynamic: {name} must be one of {names}, not {given!r}")
+
+
+def spring_dynamic(
+    problem: Problem, start: Floats | None, options: SpringDynamicOptions
+) -> Flattening:
+    """Flatten by the motion of point masses joined by springs (thesis section 2.2.4).
+
+    With the force ``f_i = sum_j C (|P_i P_j| - d_j) n_ij`` and the mass m_i of a third of the
+    surface around each vertex,
+
+    ``a = f / m``, ``v(t + dt) = (1 - damping) (v(t) + dt a)``,
+    ``q(t + dt) = q(t) + dt v(t) + dt^2 / 2 a``.
+
+    The thesis's ``stop_rule`` is kept with its defects: it ends after a few steps, with the
+    surface hardly flattened, as soon as the energy rebounds; and never on a surface that is flat
+    already, where nothing ever rises: ``max_iter`` ends it there.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface.
+    start : (n, 2) float or None
+        Flat positions to start from; None takes ``options.initial``.
+    options : SpringDynamicOptions
+        See there.
+    """
+    thesis = options.stop_rule == "thesis"
+    uv = _initial(problem, options) if start is None else upright(start, problem.mesh.F)
+    motion = _Motion(problem, options)
+    history = History.empty(problem)
+    run = _run_thesis if thesis else _run
+    uv, count, stop = run(motion, uv, options, history)
+    flips = flip_count(uv, problem.mesh.F)
+    note = f"{flips} triangles are folded over: springs do not bar it" if flips else ""
+    return finish(problem, uv, "spring_dynamic", stop, count, history, note)
+
+
+def _initial(problem: Problem, options: SpringDynamicOptions) -> Floats:
+    """Return the start that the options name."""
+    kind = options.initial or ("plane" if options.stop_rule == "thesis" else "relaxed")
+    if kind == "tutte":
+        return tutte(problem)
+    if kind == "relaxed":
+        return relax(RigidSteps(problem), tutte(problem), problem, 1e-3, 60)[0]
+    centred = problem.mesh.V - problem.mesh.V.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    return upright(centred @ axes[:2].T, problem.mesh.F)
+
+
+class _Motion:
+    """The masses, their velocity and the time step."""
+
+    def __init__(self, problem: Problem, options: SpringDynamicOptions) -> None:
+        self.problem, self.stiffness = problem, options.stiffness
+        n = len(problem.mesh.V)
+        self._mass = options.density * vertex_sum(problem.areas, problem.mesh.F, n) / 3
+        # Gershgorin: no oscillation is faster than w^2 = max 2 C degree / m.
+        degree = np.bincount(problem.edges.ravel(), minlength=n)
+        fastest = float((2 * options.stiffness * degree / self._mass).max())
+        self._dt = options.time_step or float(np.sqrt(0.01 / fastest))
+        default = 0.0 if options.stop_rule == "thesis" else 0.01
+        self._keep = 1 - (default if options.damping is None else options.damping)
+        self._velocity = np.zeros((n, 2))
+
+    def step(self, uv: Floats) -> Floats:
+        """Return the positions one time step later."""
+        p, dt = self.problem, self._dt
+        force = spring_forces(uv, p.edges, p.rest, self.stiffness)
+        acceleration = force / self._mass[:, None]
+        after: Floats = uv + dt * self._velocity + dt * dt / 2 * acceleration
+        self._velocity = self._keep * (self._velocity + dt * acceleration)
+        return after
+
+    def energy(self, uv: Floats) -> float:
+        """Return the springs' energy, or FlatteningError where the motion has blown up."""
+        value = spring_energy(uv, self.problem.edges, self.problem.rest, self.stiffness)
+        if not np.isfinite(value):
+            raise FlatteningError(
+                "spring_dynamic: the motion diverged; take a smaller time step or more damping"
+            )
+        return value
+
+
+def _run(
+    motion: _Motion, uv: Floats, options: SpringDynamicOptions, history: History
+) -> tuple[Floats, int, Stop]:
+    """Step until energy and positions rest."""
+    p = motion.problem
+    floor = options.tol**2 * options.stiffness * float((p.rest**2).sum()) / 2
+    energy = motion.energy(uv)
+    history.record(uv, energy)
+    anchor = uv
+    for count in range(1, options.max_iter + 1):
+        uv = motion.step(uv)
+        if count % WINDOW and count != options.max_iter:
+            continue
+        before, energy = energy, motion.energy(uv)
+        history.record(uv, energy)
+        moved = float(np.abs(uv - anchor).max())
+        anchor = uv
+        quiet = np.abs(before - energy) <= options.tol * (energy + floor)
+        if quiet and moved <= options.tol * p.size and count % WINDOW == 0:
+            return uv, count, Stop.CONVERGED
+    return uv, options.max_iter, Stop.MAX_ITER
+
+
+def _run_thesis(
+    motion: _Motion, uv: Floats, options: SpringDynamicOptions, history: History
+) -> tuple[Floats, int, Stop]:
+    """Step until the energy or the area error rises; the positions before that step are kept."""
+    p = motion.problem
+    energy = motion.energy(uv)
+    area = relative_area_error(uv, p.mesh.F, p.areas)
+    history.record(uv, energy)
+    for count in range(1, options.max_iter + 1):
+        after = motion.step(uv)
+        before, energy = energy, motion.energy(after)
+        area_before, area = area, relative_area_error(after, p.mesh.F, p.areas)
+        if energy > before or area > area_before:
+            return uv, count, Stop.THESIS_RULE
+        uv = after
+        history.record(uv, energy)
+    return uv, options.max_iter, Stop.MAX_ITER

@@ -1,6 +1,8 @@
 """MeshLab's filters: remeshing and surface reconstruction.  Plain arrays in and out.
 
-pymeshlab is slow to import, so it is imported on first use.
+pymeshlab is slow to import, so it is imported on first use.  Each call names every parameter:
+one that is left out keeps the value of the filter's previous call in the process, not its
+documented default.
 """
 
 from __future__ import annotations
@@ -50,15 +52,25 @@ def _arrays(meshes: Any) -> tuple[Floats, Ints]:
     return V, np.array(mesh.face_matrix(), dtype=np.int64)
 
 
-def remesh(V: Floats, F: Ints, length: float, iterations: int = 3) -> tuple[Floats, Ints]:
+def remesh(V: Floats, F: Ints, length: float, iterations: int) -> tuple[Floats, Ints]:
     """Return an isotropic triangulation of the same surface with edges of about ``length``."""
+    exact = _pymeshlab().PureValue
     meshes = _mesh_set(V, F)
     _apply(
         meshes,
         "meshing_isotropic_explicit_remeshing",
         iterations=iterations,
-        targetlen=_pymeshlab().PureValue(length),
+        adaptive=False,
+        selectedonly=False,
+        targetlen=exact(length),
+        featuredeg=30.0,
         checksurfdist=False,
+        maxsurfdist=exact(length),
+        splitflag=True,
+        collapseflag=True,
+        swapflag=True,
+        smoothflag=True,
+        reprojectflag=True,
     )
     return _arrays(meshes)
 
@@ -82,6 +94,9 @@ def ball_pivoting(points: Floats, normals: Floats, radius: float) -> tuple[Float
         meshes,
         "generate_surface_reconstruction_ball_pivoting",
         ballradius=_pymeshlab().PureValue(radius),
+        clustering=20.0,
+        creasethr=90.0,
+        deletefaces=False,
     )
     return _arrays(meshes)
 
@@ -92,7 +107,15 @@ def poisson(points: Floats, normals: Floats, depth: int) -> tuple[Floats, Ints]:
     _apply(
         meshes,
         "generate_surface_reconstruction_screened_poisson",
+        visiblelayer=False,
         depth=depth,
+        fulldepth=min(5, depth),
+        cgdepth=0,
+        scale=1.1,
+        samplespernode=1.5,
+        pointweight=4.0,
+        iters=8,
+        confidence=False,
         preclean=False,
         threads=1,
     )
@@ -113,7 +136,16 @@ def repair_manifold(V: Floats, F: Ints) -> tuple[Floats, Ints]:
 def close_holes(V: Floats, F: Ints, edges: int) -> tuple[Floats, Ints]:
     """Close holes whose border has at most the given number of edges."""
     meshes = _mesh_set(V, F)
-    _apply(meshes, "meshing_close_holes", maxholesize=edges, selfintersection=False)
+    _apply(
+        meshes,
+        "meshing_close_holes",
+        maxholesize=edges,
+        selected=False,
+        newfaceselected=False,
+        selfintersection=False,
+        refinehole=False,
+        refineholeedgelen=_pymeshlab().PureValue(1.5),
+    )
     return _arrays(meshes)
 
 

@@ -18,7 +18,14 @@ def density(points: Floats, steps: Floats | None, options: HullOptions) -> Hull:
     field = density_field(points / s, options.sigma)
     V, F = field.level_set(options.level)
     return finish(
-        V * s, F, method="density", blocks=len(points), inset=0.0, blur=field.blur, options=options
+        V * s,
+        F,
+        method="density",
+        blocks=len(points),
+        inset=0.0,
+        blur=field.blur,
+        options=options,
+        project=lambda V: field.project(V / s, options.level) * s,
     )
 
 

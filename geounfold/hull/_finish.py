@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from geounfold.backends import igl as _igl
 from geounfold.backends import meshlab
@@ -35,7 +38,7 @@ class HullOptions:
     """
 
     edge: float = 1.5
-    remesh_iterations: int = 3
+    remesh_iterations: int = 2
     sigma: float = 0.8
     level: float = 0.5
     shell: float = 0.9
@@ -43,7 +46,15 @@ class HullOptions:
 
 
 def finish(
-    V: Floats, F: Ints, *, method: str, blocks: int, inset: float, blur: float, options: HullOptions
+    V: Floats,
+    F: Ints,
+    *,
+    method: str,
+    blocks: int,
+    inset: float,
+    blur: float,
+    options: HullOptions,
+    project: Callable[[Floats], Floats] | None = None,
 ) -> Hull:
     """Return the hull made of the largest component of raw, closed triangles.
 
@@ -59,6 +70,8 @@ def finish(
         Number of blocks: the volume in working units.
     options : HullOptions
         Edge length and remeshing.
+    project : callable, optional
+        Moves points (n, 3) near the surface on to it; applied after remeshing.
 
     Raises
     ------
@@ -71,8 +84,8 @@ def finish(
     if enclosed_volume(V, F) < 0:
         F = F[:, ::-1]
     V, F = meshlab.remesh(V, F, options.edge, options.remesh_iterations)
-    kept = largest_component(F)
-    V, F = compact(V, F[kept])
+    if project is not None:
+        V = project(V)
     check_closed_manifold(F, method)
     volume = enclosed_volume(V, F)
     if volume <= 0:
@@ -102,14 +115,34 @@ def compact(V: Floats, F: Ints) -> tuple[Floats, Ints]:
 
 
 def check_closed_manifold(F: Ints, method: str) -> None:
-    """Raise HullError unless every edge has two faces and every vertex one fan of faces."""
+    """Raise HullError unless the faces bound a solid, coherently oriented.
+
+    That is: each directed edge occurs once, and so does its reverse; and the faces around each
+    vertex form one fan.
+    """
     if len(F) < 4:
         raise HullError(f"the {method} hull has no faces; {_advice(method)}")
-    if not _igl.is_manifold(F):
+    start, end = F.ravel(), F[:, [1, 2, 0]].ravel()
+    n = int(F.max()) + 1
+    edges, reverse = start * n + end, end * n + start
+    order, back = np.argsort(edges), np.argsort(reverse)
+    if (edges[order][1:] == edges[order][:-1]).any():
         raise HullError(f"the {method} hull is not manifold; {_advice(method)}")
-    open_edges = int((_igl.triangle_adjacency(F) < 0).sum())
-    if open_edges:
-        raise HullError(f"the {method} hull has {open_edges} open edges; {_advice(method)}")
+    unpaired = int((~np.isin(edges, reverse)).sum()) if _differ(edges, reverse, order, back) else 0
+    if unpaired:
+        raise HullError(f"the {method} hull has {unpaired} open edges; {_advice(method)}")
+    twin = np.empty_like(order)
+    twin[order] = back
+    around = twin.reshape(-1, 3)[:, [2, 0, 1]].ravel()  # the next half-edge out of its start
+    half = np.arange(len(start))
+    graph = coo_array((np.ones(len(half), dtype=np.int8), (half, around)), (len(half), len(half)))
+    fans = int(connected_components(graph, directed=False)[0])
+    if fans != len(np.unique(F)):
+        raise HullError(f"the {method} hull touches itself in a vertex; {_advice(method)}")
+
+
+def _differ(edges: Ints, reverse: Ints, order: Ints, back: Ints) -> bool:
+    return not np.array_equal(edges[order], reverse[back])
 
 
 def _advice(method: str) -> str:

@@ -4,7 +4,8 @@ The centroids are splatted trilinearly on a grid of half a block, blurred by a G
 ``sigma`` blocks, divided by the density inside the body, and the 0.5 level is taken.  On a
 plane face the blurred density is the normal distribution of the depth, so its quantile
 function makes it linear in the depth: marching cubes on a grid of one block then places the
-surface as well as on half a block, with a quarter of the triangles.
+surface as well as on half a block, with a quarter of the triangles.  After remeshing the
+vertices are moved on to the level set of the half-block grid by Newton steps.
 
 Only bricks near the blocks are stored, so time and memory follow the block count and not the
 bounding box, which a wide folded sheet fills poorly.
@@ -24,10 +25,10 @@ from geounfold.backends import igl as _igl
 from geounfold.geometry import unit
 from geounfold.mesh import Floats, Ints
 
-BRICK = 32  # grid nodes per brick and axis, at half a block
+BRICK = 16  # grid nodes per brick and axis, at half a block
 NODE = 0.5  # node spacing of the splat, block sides
 RADIUS = 5  # reach of the blur, nodes: three standard deviations of 0.8 blocks
-CHUNK = 32  # bricks blurred at a time: bounds the temporary memory
+CHUNK = 256  # bricks blurred at a time: bounds the temporary memory
 TIE_BREAK = 1e-4  # amplitude of the displacement that breaks exact ties, block sides
 _CLIP = 1e-4  # the quantile function is clipped to this share of the density
 _CORNERS = np.array(
@@ -86,16 +87,40 @@ class DensityField:
 
     def level_set(self, level: float) -> tuple[Floats, Ints]:
         """Return the surface (V, F), outward, on which the share is ``level``; all components."""
-        V, F = _marching_cubes(self._bricks, level * self.inner, self.inner)
-        V = V + self.origin
+        fine = self._bricks
+        coarse = _Bricks(fine.slot, fine.index, fine.values[:, ::2, ::2, ::2])
+        V, F = _marching_cubes(coarse, level * self.inner, self.inner)
+        V = V * (2 * NODE) + self.origin
         return V + _tie_break(V), F
+
+    def project(self, points: Floats, level: float, steps: int = 3) -> Floats:
+        """Return points near the surface on which the share is ``level``, moved on to it.
+
+        Each moves along its own gradient, at most half a unit per Newton step.
+        """
+        target = float(ndtri(level))
+        slope = self._slope(points)
+        steep = np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 0.3)
+        for _ in range(steps):
+            lack = (target - self._depth(points))[:, None] / steep
+            points = points + np.clip(lack, -0.5, 0.5) * (slope / steep)
+        return points
 
     def outward(self, points: Floats) -> Floats:
         """Return the direction in which the density falls, unit vectors (n, 3)."""
-        q = points - self.origin
-        steps = 0.5 * np.eye(3)
-        slope = [_trilinear(self._bricks, q - d) - _trilinear(self._bricks, q + d) for d in steps]
-        return unit(np.stack(slope, axis=1))
+        return unit(-self._slope(points))
+
+    def _depth(self, points: Floats) -> Floats:
+        """Return the normal quantile of the share: depth below the 0.5 level, in blurs."""
+        share = _trilinear(self._bricks, (points - self.origin) / NODE) / self.inner
+        out: Floats = ndtri(np.clip(share, _CLIP, 1 - _CLIP))
+        return out
+
+    def _slope(self, points: Floats) -> Floats:
+        """Return the gradient of the depth, (n, 3), by central differences over half a block."""
+        steps = 0.25 * np.eye(3)
+        slope = [self._depth(points + d) - self._depth(points - d) for d in steps]
+        return np.stack(slope, axis=1) * 2
 
 
 def density_field(points: Floats, sigma: float = 0.8) -> DensityField:
@@ -104,7 +129,7 @@ def density_field(points: Floats, sigma: float = 0.8) -> DensityField:
     q = (points - origin) / NODE
     splat, variance = _splat(q)
     bricks = _blur(splat, sigma / NODE)
-    density = _trilinear(bricks, q * NODE)
+    density = _trilinear(bricks, q)
     inner = float(np.percentile(density, 85))
     blur = math.sqrt(sigma**2 + variance * NODE**2)
     return DensityField(origin, inner, density / inner, blur, bricks)
@@ -150,34 +175,37 @@ def _splat(q: Floats) -> tuple[_Bricks, float]:
 
 
 def _blur(bricks: _Bricks, sigma: float) -> _Bricks:
-    """Blur along each axis and keep every second node: a field on a grid of one block."""
+    """Blur along each axis by a Gaussian of sigma nodes, across brick borders."""
     reach = np.arange(-RADIUS, RADIUS + 1)
     kernel = np.exp(-0.5 * (reach / sigma) ** 2)
     kernel /= kernel.sum()
-    weights = np.zeros((BRICK // 2, BRICK + 2 * RADIUS))
-    for row in range(BRICK // 2):
-        weights[row, 2 * row : 2 * row + len(kernel)] = kernel
-    for axis in range(3):
-        bricks = _blur_axis(bricks, weights, axis)
-    return bricks
+    weights = np.zeros((BRICK + 2 * RADIUS, BRICK))
+    for column in range(BRICK):
+        weights[column : column + len(kernel), column] = kernel
+    values = bricks.values
+    for axis in (2, 1, 0):
+        values = _blur_last(bricks, values, weights, axis)
+    return _Bricks(bricks.slot, bricks.index, values)
 
 
-def _blur_axis(bricks: _Bricks, weights: Floats, axis: int) -> _Bricks:
-    """Apply weights (s', s + 2 RADIUS) along one axis, across brick borders."""
+def _blur_last(bricks: _Bricks, values: Floats, weights: Floats, axis: int) -> Floats:
+    """Apply weights (s + 2 RADIUS, s) along the last axis, which is the grid's ``axis``.
+
+    The axes come back turned by one, so that three calls restore their order.
+    """
     step = np.zeros(3, dtype=np.int64)
     step[axis] = 1
     before, after = bricks.neighbour(-step), bricks.neighbour(step)
-    values = np.moveaxis(bricks.values, axis + 1, 2)  # (k, a, axis, b): a stack of matrices
-    k = len(before)
-    out = np.zeros((k + 1, values.shape[1], len(weights), values.shape[3]))
-    for start in range(0, k, CHUNK):
-        part = slice(start, min(start + CHUNK, k))
+    out = np.zeros_like(values)
+    for start in range(0, len(before), CHUNK):
+        part = slice(start, min(start + CHUNK, len(before)))
         padded = np.concatenate(
-            [values[before[part], :, -RADIUS:], values[part], values[after[part], :, :RADIUS]],
-            axis=2,
+            [values[before[part], ..., -RADIUS:], values[part], values[after[part], ..., :RADIUS]],
+            axis=-1,
         )
-        np.matmul(weights, padded, out=out[part])
-    return _Bricks(bricks.slot, bricks.index, np.ascontiguousarray(np.moveaxis(out, 2, axis + 1)))
+        blurred = padded.reshape(-1, len(weights)) @ weights
+        out[part] = np.moveaxis(blurred.reshape(-1, BRICK, BRICK, BRICK), -1, 1)
+    return out
 
 
 def _trilinear(field: _Bricks, q: Floats) -> Floats:

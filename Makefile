@@ -12,6 +12,7 @@ STAMP := $(VENV)/.stamp
 EXTRAS := dev,notebooks,parquet,view
 ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
+BENCH_ARGS ?=
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*  ## ' $(MAKEFILE_LIST) | awk -F ':.*  ## ' '{printf "%-12s%s\n", $$1, $$2}'
@@ -53,8 +54,8 @@ format: $(STAMP)  ## put the code into the standard format
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(STAMP)  ## time the stages
-	$(BIN)/python -m pytest tests/benchmarks --benchmark-only $(PYTEST_ARGS)
+bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
+	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 
 notebooks: $(STAMP)  ## bring scripts and notebooks together, then run each notebook whole
 	$(BIN)/jupytext --sync notebooks/*.py

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import importlib.util
 import os
 import tempfile
 from collections.abc import Callable
@@ -16,9 +15,6 @@ import pytest
 
 from geounfold.cli import main
 
-needs_pipeline = pytest.mark.skipif(
-    importlib.util.find_spec("geounfold.pipeline") is None, reason="there is no pipeline yet"
-)
 # Root writes into folders that forbid it.
 not_root = pytest.mark.skipif(os.geteuid() == 0, reason="permissions do not bind root")
 
@@ -290,7 +286,6 @@ def test_arguments(
     fails(argv, *words)
 
 
-@needs_pipeline
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
@@ -349,7 +344,6 @@ BODIES = {
 }
 
 
-@needs_pipeline
 @pytest.mark.parametrize("name", BODIES)
 def test_body(name: str, tmp_path: Path, fails: Callable[..., str]) -> None:
     body, words = BODIES[name]
@@ -360,7 +354,6 @@ def test_body(name: str, tmp_path: Path, fails: Callable[..., str]) -> None:
 # --------------------------------------------------------------------------- maps and surfaces
 
 
-@needs_pipeline
 @pytest.mark.parametrize(
     "content",
     [b"", b"hello", GOOD.encode(), b"PK\x03\x04" + bytes(100), b"\x80\x04K\x01."],
@@ -371,7 +364,6 @@ def test_map_file(content: bytes, tmp_path: Path, points: Path, fails: Callable[
     fails(["map", "m.npz", "p.csv", "-o", "out.csv"], "m.npz")
 
 
-@needs_pipeline
 def test_foreign_map_file(tmp_path: Path, points: Path, fails: Callable[..., str]) -> None:
     np.savez(tmp_path / "m.npz", a=np.arange(3))
     fails(["map", "m.npz", "p.csv", "-o", "out.csv"], "m.npz")

@@ -21,7 +21,10 @@ import geounfold
 from geounfold import _version
 from geounfold.cli import main
 from geounfold.cli.console import Console
+from geounfold.control import ControlMesh
 from geounfold.errors import HullError, InputError
+from geounfold.frame import Frame
+from geounfold.mesh import TetMesh
 
 COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
@@ -30,8 +33,6 @@ RESULTS = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic", "location"
 
 class FakeMap:
     """A map that shifts points; those with x < 0 lie outside."""
-
-    control = None
 
     def carry(self, points: np.ndarray, *, inverse: bool = False) -> SimpleNamespace:
         location = np.where(points[:, 0] < 0, "extrapolated", "inside")
@@ -329,20 +330,26 @@ def test_view_asks_for_numbers(
 def test_view_draws_both_spaces(
     points: Path, tmp_path: Path, calls: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn: list[str] = []
+    drawn: list[Any] = []
     _replace(
         monkeypatch,
         "plotting",
         draw_bodies=lambda _p, _q, _values, label: drawn.append(label),
-        draw_control=lambda _control: drawn.append("control"),
+        draw_control=lambda control: drawn.append(control.folded.V.tolist()),
         png=lambda _figure: b"picture",
     )
     (tmp_path / "m.npz").write_bytes(b"map")
+    corners = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    tet = TetMesh(corners, [[0, 1, 2, 3]])
+    frame = Frame(np.array([100.0, 0, 0]), np.diag([-1.0, 1, -1]), 10.0, None)
+    saved = SimpleNamespace(control=ControlMesh(tet, tet, corners[:, 2]), frame=frame)
+    monkeypatch.setattr(geounfold.mapping, "load", lambda _: saved)
     assert main(["unfold", "p.csv", "-o", "out.csv"]) == 0
     assert main(["view", "out.csv", "-o", "a.png"]) == 0
     assert main(["view", "out.csv", "-o", "b.png", "--colour", "stratigraphic"]) == 0
     assert main(["view", "m.npz", "-o", "c.png"]) == 0
-    assert drawn == ["ZC", "stratigraphic", "control"]
+    in_world = [[100, 0, 0], [90, 0, 0], [100, 10, 0], [100, 0, -10]]
+    assert drawn == ["ZC", "stratigraphic", in_world]
     assert (tmp_path / "c.png").read_bytes() == b"picture"
 
 

@@ -58,6 +58,8 @@ def unfold(args: Namespace, console: Console) -> None:
 
     result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
     summary = {**result.summary(), "input": table.facts()}
+    if samples is not None:
+        summary["samples"] = samples.facts()
     columns = _columns(_UNFOLDED, result.carried) | result.columns
     carried = None if samples is None else _columns(_UNFOLDED, result.map.carry(samples.points))
     console.stage("writing")
@@ -201,10 +203,12 @@ def view(args: Namespace, console: Console) -> None:
 def _draw_map(path: str, console: Console) -> bytes:
     """Return a picture of a saved map's control mesh in both spaces."""
     from geounfold import mapping, plotting
+    from geounfold.control import scaled
 
-    control = mapping.load(path).control
+    saved = mapping.load(path)
+    folded = saved.frame.to_world(saved.control.folded.V)
     console.stage("drawing")
-    return plotting.png(plotting.draw_control(control))
+    return plotting.png(plotting.draw_control(scaled(saved.control, folded, saved.frame.scale)))
 
 
 def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
@@ -312,5 +316,13 @@ def _print_figures(figures: dict[str, Any], indent: str = "") -> None:
             sys.stdout.write(f"{indent}{name}\n")
             _print_figures(value, indent + "  ")
         else:
-            shown = f"{value:.6g}" if isinstance(value, float) else str(value)
-            sys.stdout.write(f"{indent}{name:<{width}}  {shown}\n")
+            sys.stdout.write(f"{indent}{name:<{width}}  {_figure(value)}\n")
+
+
+def _figure(value: Any) -> str:
+    """Return a figure to six digits; several one after the other; a dash for none."""
+    if isinstance(value, tuple | list):
+        return "  ".join(map(_figure, value))
+    if value is None:
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geounfold.errors import OptionError
-from geounfold.flattening._problem import Problem, make_problem
+from geounfold.flattening._problem import Problem, make_problem, upright
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.arap import ArapOptions, arap
 from geounfold.flattening.initial import check_disk
@@ -86,7 +86,8 @@ def flatten(
     method : str
         A name in FLATTENERS.
     start : (n, 2) array, optional
-        Flat positions to start from; by default Tutte's embedding.
+        Flat positions to start from, mirrored back where they are mirrored; by default
+        Tutte's embedding.
     rest : (k,) array, optional
         Length that each edge of ``geometry.unique_edges(F)`` should have when flat, in the
         vertices' unit; by default its length in the mesh.  For intrinsic methods alone.
@@ -123,7 +124,9 @@ def flatten(
         wanted, given = flattener.options.__name__, type(chosen).__name__
         raise OptionError(f"{method} takes options of type {wanted}, not {given}")
     problem = _problem(mesh, rest, flattener)
-    return flattener.function(problem, _checked_start(start, len(problem.mesh.V)), chosen)
+    return flattener.function(
+        problem, _checked_start(start, len(problem.mesh.V), problem.mesh.F), chosen
+    )
 
 
 def tutte(mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None = None) -> Floats:
@@ -153,11 +156,11 @@ def _problem(
     return make_problem(surface, loops, wanted)
 
 
-def _checked_start(start: ArrayLike | None, n: int) -> Floats | None:
-    """Return a copy of the start, or None."""
+def _checked_start(start: ArrayLike | None, n: int, F: Ints) -> Floats | None:
+    """Return the start centred and never mirrored, or None."""
     if start is None:
         return None
     uv = np.array(start, dtype=np.float64)
     if uv.shape != (n, 2) or not np.isfinite(uv).all():
         raise OptionError(f"start must be finite and of shape ({n}, 2), but has {uv.shape}")
-    return uv
+    return upright(uv, F)

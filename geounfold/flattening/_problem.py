@@ -124,6 +124,12 @@ def upright(uv: Floats, F: Ints) -> Floats:
     return out
 
 
+def displacement(before: Floats, after: Floats) -> float:
+    """Return the largest distance that a vertex moved."""
+    step = after - before
+    return float(np.hypot(step[:, 0], step[:, 1]).max())
+
+
 def flip_count(uv: Floats, F: Ints) -> int:
     """Return the number of triangles whose flat area is not positive."""
     return int(np.count_nonzero(~(triangle_areas(uv, F) > 0)))

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from geounfold.flattening._linear import incidence, pinned_solver
-from geounfold.flattening._problem import Problem, flip_count
+from geounfold.flattening._problem import Problem, displacement, flip_count
 from geounfold.mesh import Floats, Ints
 
 
@@ -62,7 +62,7 @@ def relax(
     unfolded = None if flip_count(uv, F) else uv
     for count in range(1, max_iter + 1):
         after = step(uv)
-        moved = float(np.abs(after - uv).max())
+        moved = displacement(uv, after)
         uv = after
         if flip_count(uv, F) == 0:
             unfolded = uv

@@ -8,7 +8,7 @@ import numpy as np
 
 from geounfold.backends import igl as backend
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.flattening._problem import History, Problem, finish, flip_count
+from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.initial import tutte
 from geounfold.flattening.measures import arap_energy
@@ -55,7 +55,7 @@ def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flatte
     options : ArapOptions
         See there.
     """
-    uv = tutte(problem) if start is None else start - start.mean(axis=0)
+    uv = tutte(problem) if start is None else start
     # A common size for every unit: libigl's solver has absolute thresholds.
     V, F, size = problem.mesh.V, problem.mesh.F, problem.size
     history = History.empty(problem)
@@ -67,7 +67,7 @@ def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flatte
             count += 1
             after = step(uv / size) * size
             after -= after.mean(axis=0)
-            if np.abs(after - uv).max() <= options.tol * size:
+            if displacement(uv, after) <= options.tol * size:
                 stop = Stop.CONVERGED
             uv = after
             if count % RECORD == 0 or stop is Stop.CONVERGED or count == options.max_iter:

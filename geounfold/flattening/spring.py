@@ -11,7 +11,7 @@ import scipy.sparse.linalg as spl
 from geounfold.errors import FlatteningError, OptionError
 from geounfold.flattening._guard import FoldGuard
 from geounfold.flattening._linear import factor, incidence, pinned_solver, preconditioned_solve
-from geounfold.flattening._problem import History, Problem, finish, flip_count
+from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._rigid import RigidSteps, relax
 from geounfold.flattening._springs import (
@@ -252,7 +252,7 @@ def _descend(
     history.record(uv, scale * energy)
     for count in range(1, options.max_iter + 1):
         after, lower, predicted = _one_step(system, uv, energy)
-        moved = float(np.abs(after - uv).max())
+        moved = displacement(uv, after)
         small = tol * (lower + floor)
         quiet = energy - lower <= small and (lower < energy or predicted <= small)
         uv, energy = after, lower

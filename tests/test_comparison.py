@@ -1,0 +1,63 @@
+"""The table of flatteners."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geounfold.comparison import COLUMNS, compare
+from geounfold.errors import OptionError
+from geounfold.flattening import FLATTENERS, ArapOptions
+from geounfold.mesh import TriMesh
+
+S = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+SQUARE = TriMesh(S, [[0, 1, 2], [0, 2, 3]])
+TENT = TriMesh(np.c_[S[:, :2], [0, 0.5, 0, 0.5]], SQUARE.F)
+CLOSED = TriMesh(
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+)
+
+
+def test_one_row_per_surface_and_flattener():
+    table = compare({"square": SQUARE, "tent": TENT})
+    assert list(table.columns) == list(COLUMNS)
+    assert len(table) == 2 * len(FLATTENERS)
+    assert set(table.flattener) == set(FLATTENERS)
+    assert (table.error == "").all()
+    assert (table.flips == 0).all()
+    assert (table.seconds > 0).all()
+    # Two triangles unfold exactly: measured 7e-16 at most.
+    assert (table.symmetric_dirichlet < 4 + 1e-9).all()
+    assert (table.area_error < 1e-9).all()
+
+
+def test_a_failing_method_is_a_row_that_says_why():
+    table = compare({"closed": CLOSED, "square": SQUARE}, ["spring", "lscm"])
+    failed = table[table.surface == "closed"]
+    assert failed.error.str.contains("closed").all()
+    assert failed.flips.isna().all()
+    assert failed.area_error.isna().all()
+    assert (table[table.surface == "square"].error == "").all()
+
+
+def test_single_surfaces_pairs_and_single_names():
+    for mesh in (SQUARE, (SQUARE.V, SQUARE.F)):
+        table = compare(mesh, "spring")
+        assert table[["surface", "flattener"]].to_numpy().tolist() == [["surface", "spring"]]
+
+
+def test_options_reach_their_flattener():
+    table = compare(TENT, ["arap"], {"arap": ArapOptions(max_iter=1)})
+    assert table.iterations[0] == 1
+    assert table.stop[0] == "max_iter"
+
+
+@pytest.mark.parametrize("names", ["origami", ["spring", "origami"], []])
+def test_unknown_flatteners_are_refused(names):
+    with pytest.raises(OptionError, match="unknown flatteners"):
+        compare(SQUARE, names)
+
+
+def test_options_of_an_unknown_flattener_are_refused():
+    with pytest.raises(OptionError, match="origami"):
+        compare(SQUARE, "spring", {"origami": None})

@@ -512,7 +512,7 @@ def draw_distribution(values: Floats, label: str) -> Figure:
     quantiles = [0.5, 0.9, 0.95]
     at = np.quantile(v, quantiles)
     right.plot(at, quantiles, "o", color=BOTTOM)
-    notes = [f"{q:.0%} at or below {x:.3g}" for q, x in zip(quantiles, at, strict=True)]
+    notes = [f"{q:.0%} at or below {x:.4g}" for q, x in zip(quantiles, at, strict=True)]
     right.text(0.97, 0.06, "\n".join(notes), transform=right.transAxes, ha="right", fontsize=10)
     right.set(xlabel=label, ylabel="share of blocks", ylim=(0, 1.02))
     for ax in (left, right):

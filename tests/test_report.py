@@ -1,0 +1,123 @@
+"""The report: complete, self-contained, and plain about what is wrong."""
+
+from __future__ import annotations
+
+import base64
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from geounfold.errors import InputError, MissingDependencyError
+from geounfold.plotting import ViewOptions, check_rendering
+from geounfold.report import report_html, verdict, write_report
+
+try:
+    check_rendering()
+    CANNOT = ""
+except MissingDependencyError as error:
+    CANNOT = str(error)
+needs_rendering = pytest.mark.skipif(bool(CANNOT), reason=CANNOT or "nothing is missing")
+
+SMALL = ViewOptions(size=(80, 60))
+GRID = np.stack(np.meshgrid(*[np.arange(float(n)) for n in (6, 5, 4)], indexing="ij"), -1)
+SLAB = GRID.reshape(-1, 3)
+COLUMNS = {"stratigraphic": SLAB[:, 2] / 3, "shear": SLAB[:, 0] / 5, "location": ["inside"] * 120}
+SOUND = {"inverted_folded": 0, "inverted_unfolded": 0, "injective": True, "outside_share": 0.0}
+SUMMARY = SOUND | {
+    "version": "9.8.7",
+    "options": {"method": "sheet", "hull": {"sigma": 0.8}},
+    "seconds": {"hull": 0.25, "map": 0.5},
+    "round_trip_max": 1e-12,
+    "nmd": {"mean": 0.0123, "std": 0.01, "p95": 0.04, "max": 0.3},
+    "top": {"faces": 10, "area": 5.0},
+    "flattening": {"top": {"stop": "converged", "iterations": 7, "flips": 0}},
+    "warnings": ["3 points <b>repeat</b> others"],
+}
+
+
+class Page(HTMLParser):
+    """Every tag that opens is closed, and nothing is loaded from elsewhere."""
+
+    VOID = frozenset({"meta", "img", "link", "br"})
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.images, self.words = [], [], []
+        self.feed(page)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        for name, value in attributes:
+            assert name not in ("href", "srcset", "onload")
+            if name == "src":
+                self.images.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@needs_rendering
+def test_the_page_is_whole_and_loads_nothing(tmp_path):
+    path = tmp_path / "r.html"
+    write_report(path, SUMMARY, SLAB, SLAB + 1.0, COLUMNS, view=SMALL)
+    text = path.read_text(encoding="utf-8")
+    page, words = Page(text), " ".join(Page(text).words)
+    # Layers, neighbour distances, epsilon, shear in 3-D; distributions of epsilon and shear.
+    assert len(page.images) == 6
+    for source in page.images:
+        head, data = source.split(",", 1)
+        assert head == "data:image/png;base64"
+        assert base64.b64decode(data, validate=True).startswith(b"\x89PNG")
+    assert not re.search(r"https?://|url\(|@import|<script", text)
+    for expected in ("120 blocks", "9.8.7", "hull.sigma", "0.8", "converged", "Sound", "1.23%"):
+        assert expected in words
+    assert "3 points <b>repeat</b> others" in words  # escaped: read as text, not as a tag
+
+
+@needs_rendering
+def test_a_summary_without_anything_still_gives_a_page():
+    page = Page(report_html({}, SLAB[:8], SLAB[:8], {}, view=SMALL))
+    assert not page.images  # nothing to colour by, too few blocks for 26 neighbours
+    assert "It is not known whether the map folds over itself." in " ".join(page.words)
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "said"),
+    [
+        ({}, "good", "proved"),
+        ({"injective": False}, "care", "not proved"),
+        ({"injective": None}, "care", "not proved"),
+        ({"outside_share": 0.02}, "care", "2.00% of the blocks"),
+        ({"inverted_unfolded": 1}, "bad", "folds over itself"),
+        ({"inverted_folded": 5, "outside_share": 0.5}, "bad", "folds over itself"),
+        ({"inverted_folded": None}, "care", "not known"),
+    ],
+)
+def test_the_verdict_follows_the_worst_thing_known(change, level, said):
+    given = verdict(SOUND | change)
+    assert given.level == level
+    assert said in given.headline
+
+
+def test_the_verdict_says_what_the_measure_hides():
+    assert any("would score 0" in reason for reason in verdict(SUMMARY).reasons)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (({}, SLAB, SLAB[1:], {}), "must both be"),
+        (({}, SLAB, SLAB, {"shear": SLAB[:5, 0]}), r"column shear has shape \(5,\)"),
+        (({}, SLAB, SLAB, {"shear": SLAB[:, 0] * np.nan}), "column shear has 120 values"),
+    ],
+)
+def test_bad_input_is_refused_with_its_reason(arguments, message):
+    with pytest.raises(InputError, match=message):
+        report_html(*arguments)

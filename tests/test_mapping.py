@@ -63,7 +63,7 @@ def test_no_points_give_no_points():
 
 
 @pytest.mark.parametrize(
-    "points, words",
+    ("points", "words"),
     [(np.zeros((3, 2)), "shape"), (np.array([[0.0, 0, 0], [0, np.nan, 0]]), "row 2")],
 )
 def test_bad_points_are_refused(points, words):

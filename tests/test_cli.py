@@ -22,7 +22,7 @@ from geounfold import _version
 from geounfold.cli import main
 from geounfold.cli.console import Console
 from geounfold.control import ControlMesh
-from geounfold.errors import HullError, InputError
+from geounfold.errors import HullError, InputError, MissingDependencyError
 from geounfold.frame import Frame
 from geounfold.mesh import TetMesh
 
@@ -149,6 +149,7 @@ def test_unfold_writes_everything(
         path.write_text("<html>")
 
     _replace(monkeypatch, "report", write_report=write_report)
+    _replace(monkeypatch, "plotting", check_rendering=lambda: None)
     (tmp_path / "q.csv").write_text("hole;x;y;z\na;1;1;1\n")
     argv = [
         "unfold",
@@ -391,8 +392,24 @@ def test_failing_last_output_leaves_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     _replace(monkeypatch, "report", write_report=_raise(error))
+    _replace(monkeypatch, "plotting", check_rendering=lambda: None)
     assert main(["unfold", "p.csv", "-o", "out.csv", "--report", "r.html"]) in (2, 130)
     assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [points]
+
+
+def test_pictures_are_tried_before_computing(
+    points: Path,
+    tmp_path: Path,
+    calls: list[dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    missing = MissingDependencyError("libGL is missing: apt install libgl1")
+    _replace(monkeypatch, "plotting", check_rendering=_raise(missing))
+    assert main(["unfold", "p.csv", "-o", "out.csv", "--report", "r.html"]) == 1
+    assert capsys.readouterr().err == f"geounfold: error: {missing}\n"
+    assert calls == []
     assert list(tmp_path.iterdir()) == [points]
 
 

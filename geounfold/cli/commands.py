@@ -48,6 +48,8 @@ def unfold(args: Namespace, console: Console) -> None:
         _given(args.points, args.samples, args.top, args.bottom),
         overwrite=args.overwrite,
     )
+    if args.report is not None:
+        _check_pictures(console)
     table = _read(args.points, args, console)
     samples = _read_samples(args, console)
     surfaces = {
@@ -233,6 +235,14 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
         plotting.require("matplotlib.image").imsave(stream, image, format="png")
         return stream.getvalue()
     return plotting.png(plotting.draw_bodies(table.points, twin, values, label))
+
+
+def _check_pictures(console: Console) -> None:
+    """Raise where nothing can be drawn, before anything is computed."""
+    from geounfold import plotting
+
+    console.stage("checking off-screen rendering")
+    plotting.check_rendering()
 
 
 def _given(*paths: str | None) -> list[str]:

@@ -52,6 +52,7 @@ body { margin: 0 auto; max-width: 78rem; padding: 1.5rem; background: var(--page
   color: var(--ink); font: 16px/1.5 system-ui, sans-serif; }
 h1 { margin: 0 0 .2rem; font-size: 1.6rem; }
 h2 { margin: 2.2rem 0 .6rem; font-size: 1.2rem; }
+summary { margin: 1.4rem 0 .6rem; font-size: 1.2rem; font-weight: bold; cursor: pointer; }
 .soft, figcaption { color: var(--soft); font-size: .9rem; }
 .verdict { border-left: .4rem solid; border-radius: .2rem; background: var(--card);
   padding: .8rem 1.1rem; margin: 1.2rem 0; }
@@ -72,7 +73,7 @@ figure img { display: block; width: 100%; height: auto; background: #ffffff;
 table { border-collapse: collapse; font-size: .9rem; }
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line);
   vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; }
+th + th, td.number { text-align: right; font-variant-numeric: tabular-nums; }
 pre { overflow-x: auto; background: var(--card); padding: .8rem; font-size: .8rem; }
 """
 
@@ -141,9 +142,8 @@ def report_html(
         *_distributions(drawn),
         _section("Surfaces", _surfaces(summary)),
         _section("Seconds", _table([_flat(summary.get("seconds", {}))])),
-        _section("Options", _pairs(_flat(summary.get("options", {})))),
-        "<details><summary>Everything, as JSON</summary>",
-        f"<pre>{_text(json.dumps(summary, indent=1, default=str))}</pre></details>",
+        _folded_up("Options", _pairs(_flat(summary.get("options", {})))),
+        _folded_up("Everything, as JSON", f"<pre>{_text(_json(summary))}</pre>"),
     ]
     return _PAGE.format(title=title, style=_STYLE, body="\n".join(body))
 
@@ -304,8 +304,10 @@ def _text(value: object) -> str:
 
 def _number(value: object) -> str:
     """Write a number as people read it; anything else as it is."""
-    if isinstance(value, bool) or value is None:
-        return {True: "yes", False: "no", None: "not known"}[value]
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, int):
         return f"{value:,}"
     if isinstance(value, float):
@@ -327,6 +329,15 @@ def _flat(nested: object, prefix: str = "") -> dict[str, Any]:
 
 def _section(title: str, content: str) -> str:
     return f"<h2>{_text(title)}</h2>\n{content}" if content else ""
+
+
+def _folded_up(title: str, content: str) -> str:
+    """Return a section that opens on demand; nothing where there is no content."""
+    return f"<details><summary>{_text(title)}</summary>\n{content}</details>" if content else ""
+
+
+def _json(summary: Mapping[str, Any]) -> str:
+    return json.dumps(summary, indent=1, default=str)
 
 
 def _list(items: Iterable[object]) -> str:

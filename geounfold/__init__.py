@@ -7,16 +7,46 @@
 0.0
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from geounfold._version import __version__
-from geounfold.control import ControlMesh
-from geounfold.errors import GeounfoldError, InputError
-from geounfold.flattening import FLATTENERS, Flattening, flatten
-from geounfold.mapping import UnfoldingMap, load
-from geounfold.mesh import TetMesh, TriMesh
-from geounfold.options import UnfoldOptions
-from geounfold.pipeline import Unfolding, unfold
-from geounfold.quality import aligned_rms, epsilon, neighbours, nmd
-from geounfold.synthetic import simulate
+
+if TYPE_CHECKING:
+    from geounfold.comparison import compare
+    from geounfold.control import ControlMesh
+    from geounfold.errors import GeounfoldError, InputError
+    from geounfold.flattening import FLATTENERS, Flattening, flatten
+    from geounfold.mapping import UnfoldingMap, load
+    from geounfold.mesh import TetMesh, TriMesh
+    from geounfold.options import UnfoldOptions
+    from geounfold.pipeline import Unfolding, unfold
+    from geounfold.quality import aligned_rms, epsilon, neighbours, nmd
+    from geounfold.synthetic import simulate
+
+_HOMES = {
+    "compare": "comparison",
+    "ControlMesh": "control",
+    "GeounfoldError": "errors",
+    "InputError": "errors",
+    "FLATTENERS": "flattening",
+    "Flattening": "flattening",
+    "flatten": "flattening",
+    "UnfoldingMap": "mapping",
+    "load": "mapping",
+    "TetMesh": "mesh",
+    "TriMesh": "mesh",
+    "UnfoldOptions": "options",
+    "Unfolding": "pipeline",
+    "unfold": "pipeline",
+    "aligned_rms": "quality",
+    "epsilon": "quality",
+    "neighbours": "quality",
+    "nmd": "quality",
+    "simulate": "synthetic",
+}
 
 __all__ = [
     "FLATTENERS",
@@ -31,6 +61,7 @@ __all__ = [
     "UnfoldingMap",
     "__version__",
     "aligned_rms",
+    "compare",
     "epsilon",
     "flatten",
     "load",
@@ -39,3 +70,17 @@ __all__ = [
     "simulate",
     "unfold",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used, so that starting costs little."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted([*globals(), *_HOMES])

@@ -291,7 +291,8 @@ def _options(args: Namespace) -> UnfoldOptions:
     }
     names = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours")
     given = {n: getattr(args, n) for n in names if hasattr(args, n)}
-    return UnfoldOptions(**{n: readers.get(n, str)(text) for n, text in given.items()})
+    values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
+    return UnfoldOptions(allow_uncertified=hasattr(args, "allow_uncertified"), **values)
 
 
 def _direction(text: str) -> tuple[float, float, float]:

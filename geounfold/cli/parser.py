@@ -143,7 +143,7 @@ def _add_model(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("method")
     given: dict[str, Any] = {"default": argparse.SUPPRESS}
     group.add_argument(
-        "--method", metavar="M", help="sheet (default), thesis or ufo: how the map is made", **given
+        "--method", metavar="M", help="sheet (default) or thesis: how the map is made", **given
     )
     group.add_argument(
         "--flattener", metavar="F", help="spring (default) or another: `compare` shows all", **given
@@ -173,6 +173,12 @@ def _add_model(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--neighbours", metavar="K", help="neighbours per block in NMD (default 26)", **given
+    )
+    group.add_argument(
+        "--allow-uncertified",
+        action="store_true",
+        help="write the answer even where control tetrahedra are inverted",
+        **given,
     )
 
 

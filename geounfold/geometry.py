@@ -59,10 +59,11 @@ def face_normals(V: Floats, F: Ints) -> Floats:
 def vertex_sum(values: Floats, F: Ints, n: int) -> Floats:
     """Return the sum over each vertex's faces of a value per face, (n,) or (n, d)."""
     index = F.ravel()
-    if values.ndim == 1:
-        return np.bincount(index, np.repeat(values, F.shape[1]), n)
-    columns = [np.bincount(index, np.repeat(column, F.shape[1]), n) for column in values.T]
-    return np.stack(columns, axis=1)
+    columns = [
+        np.bincount(index, weights=np.repeat(column, F.shape[1]), minlength=n).astype(np.float64)
+        for column in np.atleast_2d(values.T)
+    ]
+    return columns[0] if values.ndim == 1 else np.stack(columns, axis=1)
 
 
 def unit(vectors: Floats) -> Floats:
@@ -89,7 +90,7 @@ def tet_volumes(V: Floats, T: Ints) -> Floats:
     """Return the signed volume of each tetrahedron, (m,); negative where inverted.
 
     >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> [round(v * 6, 12) for v in tet_volumes(corner, np.array([[0, 1, 2, 3], [1, 0, 2, 3]]))]
+    >>> (6 * tet_volumes(corner, np.array([[0, 1, 2, 3], [1, 0, 2, 3]]))).round(12).tolist()
     [1.0, -1.0]
     """
     a = V[T[:, 0]]

@@ -75,16 +75,18 @@ def remesh(V: Floats, F: Ints, length: float, iterations: int) -> tuple[Floats, 
     return _arrays(meshes)
 
 
-def alpha_shape(points: Floats, alpha: float) -> tuple[Floats, Ints]:
-    """Return the boundary faces of the alpha shape of points (n, 3); ``alpha`` is a radius."""
-    meshes = _mesh_set(points)
+def taubin(V: Floats, F: Ints, steps: int) -> Floats:
+    """Return the vertices smoothed by Taubin's shrink and swell steps, which keep the volume."""
+    meshes = _mesh_set(V, F)
     _apply(
         meshes,
-        "generate_alpha_shape",
-        alpha=_pymeshlab().PureValue(alpha),
-        filtering="Alpha Shape",
+        "apply_coord_taubin_smoothing",
+        lambda_=0.5,
+        mu=-0.53,
+        stepsmoothnum=steps,
+        selected=False,
     )
-    return _arrays(meshes)
+    return _arrays(meshes)[0]
 
 
 def ball_pivoting(points: Floats, normals: Floats, radius: float) -> tuple[Floats, Ints]:

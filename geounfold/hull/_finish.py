@@ -33,8 +33,10 @@ class HullOptions:
         Share of the inner density on the density hull.
     shell : float
         Points whose density share is below this make up the shell.
+    smoothing : int
+        Taubin steps that take the block steps out of a hull through the outermost centroids.
     alpha : float or None
-        Radius of the alpha shape; None to find the smallest that encloses every point.
+        Radius of the alpha shape; None to find the smallest that encloses the points.
     """
 
     edge: float = 1.5
@@ -42,6 +44,7 @@ class HullOptions:
     sigma: float = 0.8
     level: float = 0.5
     shell: float = 0.9
+    smoothing: int = 10
     alpha: float | None = None
 
 
@@ -55,6 +58,7 @@ def finish(
     blur: float,
     options: HullOptions,
     project: Callable[[Floats], Floats] | None = None,
+    smoothing: int = 0,
 ) -> Hull:
     """Return the hull made of the largest component of raw, closed triangles.
 
@@ -72,6 +76,8 @@ def finish(
         Edge length and remeshing.
     project : callable, optional
         Moves points (n, 3) near the surface on to it; applied after remeshing.
+    smoothing : int
+        Taubin steps before remeshing.
 
     Raises
     ------
@@ -83,6 +89,8 @@ def finish(
     check_closed_manifold(F, method)
     if enclosed_volume(V, F) < 0:
         F = F[:, ::-1]
+    if smoothing:
+        V = meshlab.taubin(V, F, smoothing)
     V, F = meshlab.remesh(V, F, options.edge, options.remesh_iterations)
     if project is not None:
         V = project(V)

@@ -23,6 +23,8 @@ from scipy.special import ndtri
 
 from geounfold.backends import igl as _igl
 from geounfold.geometry import unit
+from geounfold.hull._finish import HullOptions, finish
+from geounfold.hull._result import Hull
 from geounfold.mesh import Floats, Ints
 
 BRICK = 16  # grid nodes per brick and axis, at half a block
@@ -91,7 +93,7 @@ class DensityField:
         coarse = _Bricks(fine.slot, fine.index, fine.values[:, ::2, ::2, ::2])
         V, F = _marching_cubes(coarse, level * self.inner, self.inner)
         V = V * (2 * NODE) + self.origin
-        return V + _tie_break(V), F
+        return V + tie_break(V), F
 
     def project(self, points: Floats, level: float, steps: int = 3) -> Floats:
         """Return points near the surface on which the share is ``level``, moved on to it.
@@ -123,6 +125,38 @@ class DensityField:
         return np.stack(slope, axis=1) * 2
 
 
+def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
+    """Return the hull on which the blurred block density is half its inner value.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Centroids, working units.
+    sides : (3,) float
+        Block sides along the axes, working units; density and blur are isotropic in
+        ``points / sides``.
+    options : HullOptions
+        ``sigma``, ``level`` and the remeshing are used.
+
+    Raises
+    ------
+    HullError
+        The points are too sparse for any part of the grid to reach the level.
+    """
+    field = density_field(points / sides, options.sigma)
+    V, F = field.level_set(options.level)
+    return finish(
+        V * sides,
+        F,
+        method="density",
+        blocks=len(points),
+        inset=0.0,
+        blur=field.blur,
+        options=options,
+        project=lambda x: field.project(x / sides, options.level) * sides,
+    )
+
+
 def density_field(points: Floats, sigma: float = 0.8) -> DensityField:
     """Return the density of points (n, 3), blurred by a Gaussian of standard deviation sigma."""
     origin = points.min(axis=0) - 2 * BRICK * NODE
@@ -135,7 +169,7 @@ def density_field(points: Floats, sigma: float = 0.8) -> DensityField:
     return DensityField(origin, inner, density / inner, blur, bricks)
 
 
-def _tie_break(V: Floats) -> Floats:
+def tie_break(V: Floats) -> Floats:
     """Return a smooth displacement (n, 3) that leaves no two edges of equal length.
 
     On a lattice whole families of lengths are exactly equal, and which edge a remesher then

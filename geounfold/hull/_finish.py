@@ -111,6 +111,8 @@ def finish(
 
 def largest_component(F: Ints) -> Bools:
     """Return which faces belong to the component (across edges) with the most faces, (m,)."""
+    if not len(F):
+        return np.zeros(0, dtype=bool)
     component = _igl.face_components(F)
     out: Bools = component == np.bincount(component).argmax()
     return out

@@ -41,7 +41,7 @@ def outer_shell(points: Floats, sigma: float, below: float) -> Shell:
     sigma : float
         Standard deviation of the density's blur.
     below : float
-        Share of the inner density: 0.73 at the centroids of an outermost plane layer and 0.97
+        Share of the inner density: 0.75 at the centroids of an outermost plane layer and 0.98
         in the next, so 0.9 takes one layer.
 
     Raises

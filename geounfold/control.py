@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,43 +43,43 @@ DATUMS = ("mid", "top", "bottom", "proportional")
 """Which surface is flat in the unfolded space; ``proportional``: top and bottom both."""
 
 
-def with_datum(
-    control: ControlMesh, bottom: Floats, top: Floats, weight: Floats, datum: str
-) -> ControlMesh:
-    """Return the control mesh with another surface flat.
+@dataclass(frozen=True)
+class Datum:
+    """How heights over the flat mid surface become unfolded z.
 
-    Heights are sheared along the prisms, so ``top`` and ``bottom`` keep every volume and every
-    thickness; ``proportional`` also scales them to the mean thickness.
+    ``top`` and ``bottom`` shear the flat space vertically, so that every volume and every
+    thickness stays; ``proportional`` also scales thicknesses to their mean.
 
-    Parameters
+    Attributes
     ----------
-    control : ControlMesh
-        With the mid surface flat; vertices in layers of n.
-    bottom, top : (n,) float
-        Height of the bottom and of the top at the vertices of a layer.
-    weight : (n,) float
-        Weights of the means.
-    datum : str
+    name : str
         One of DATUMS.
+    bottom, top : float
+        Mean height of bottom and top, which the flat ones come to lie at.
 
     Raises
     ------
     OptionError
         An unknown datum.
     """
-    if datum not in DATUMS:
-        raise OptionError(f"unknown datum {datum!r}; valid: {', '.join(DATUMS)}")
-    if datum == "mid":
-        return control
-    V = np.array(control.unfolded.V)
-    if datum == "proportional":
-        thickness = float(np.average(top - bottom, weights=weight))
-        V[:, 2] = (control.stratigraphic - 0.5) * thickness
-    else:
-        surface = top if datum == "top" else bottom
-        shift = np.average(surface, weights=weight) - surface
-        V[:, 2] += np.tile(shift, len(V) // len(shift))
-    return replace(control, unfolded=control.unfolded.with_vertices(V))
+
+    name: str
+    bottom: float
+    top: float
+
+    def __post_init__(self) -> None:
+        if self.name not in DATUMS:
+            raise OptionError(f"unknown datum {self.name!r}; valid: {', '.join(DATUMS)}")
+
+    def z(self, height: Floats, bottom: Floats, top: Floats) -> Floats:
+        """Return z (n,) of points at heights over places with these bottoms and tops."""
+        if self.name == "top":
+            return height - top + self.top
+        if self.name == "bottom":
+            return height - bottom + self.bottom
+        if self.name == "proportional":
+            return ((height - bottom) / (top - bottom) - 0.5) * (self.top - self.bottom)
+        return height
 
 
 def scaled(control: ControlMesh, folded: Floats, factor: float) -> ControlMesh:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.control import ControlMesh, with_datum
+from geounfold.control import ControlMesh
 from geounfold.errors import ControlMeshError
 from geounfold.flattening import FLATTENERS, Flattening, flatten
 from geounfold.frame import Frame
@@ -22,6 +22,9 @@ from geounfold.split import SurfaceSplit, split
 
 Stage = Callable[[str], AbstractContextManager[None]]
 """``with stage("hull"):`` times a stage and shows its name."""
+
+
+_OTHER_SIDE = {"top": "bottom", "bottom": "top"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +108,13 @@ def fit(
     else:
         with stage("split"):
             parts = split_reference(*reference)
+    over = top_looks_down(parts, frame.up_in_work(options.up))
     if options.method == "thesis":
         result = _fit_thesis(points, hull, parts, options, stage)
     else:
-        result = _fit_sheet(points, frame, hull, parts, options, stage)
-    if top_looks_down(parts, frame.up_in_work(options.up)):
+        datum = _OTHER_SIDE.get(options.datum, options.datum) if over else options.datum
+        result = _fit_sheet(points, frame, hull, parts, options, datum, stage)
+    if over:
         result = _turned_over(result)
     _check_upright(result.control, frame, options)
     return result
@@ -134,20 +139,19 @@ def _fit_sheet(
     hull: Hull | None,
     parts: SurfaceSplit,
     options: UnfoldOptions,
+    datum: str,
     stage: Stage,
 ) -> BodyFit:
     variance = np.zeros(3) if hull is None else hull.blur_variance(frame.steps)
     inset = 0.0 if hull is None else hull.inset
     with stage("sheet"):
         result = fit_body(
-            parts, points, variance, inset, _flattener(options), options.sheet_options
+            parts, points, variance, inset, _flattener(options), options.sheet_options, datum
         )
     mesh = result.mesh
-    bottom, top = mesh.heights
-    control = with_datum(mesh.control, bottom, top, mesh.weight, options.datum)
     surfaces = {
         name: SurfacePair(folded, unfolded, mesh.flattenings[name])
-        for name, (folded, unfolded) in mesh.surfaces(control).items()
+        for name, (folded, unfolded) in mesh.surfaces.items()
     }
     notes = {
         "rung": mesh.rung,
@@ -156,7 +160,7 @@ def _fit_sheet(
         "smoothing": result.fitted.smoothing,
         "accepted_samples": result.fitted.accepted,
     }
-    return BodyFit(hull, parts, control, surfaces, mesh.flattenings, result, notes)
+    return BodyFit(hull, parts, mesh.control, surfaces, mesh.flattenings, result, notes)
 
 
 def _fit_thesis(
@@ -189,14 +193,13 @@ def _turned_over(result: BodyFit) -> BodyFit:
         result.control.unfolded.with_vertices(_over(result.control.unfolded.V)),
         1 - result.control.stratigraphic,
     )
-    other = {"top": "bottom", "bottom": "top"}
     surfaces = {
-        other.get(name, name): SurfacePair(
+        _OTHER_SIDE.get(name, name): SurfacePair(
             pair.folded, pair.unfolded.with_vertices(_over(pair.unfolded.V)), pair.flattening
         )
         for name, pair in result.surfaces.items()
     }
-    flattenings = {other.get(name, name): f for name, f in result.flattenings.items()}
+    flattenings = {_OTHER_SIDE.get(name, name): f for name, f in result.flattenings.items()}
     parts = result.split
     turned = SurfaceSplit(
         parts.mesh,

@@ -11,7 +11,7 @@ import numpy as np
 from geounfold.control import DATUMS
 from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
-from geounfold.hull import HullOptions
+from geounfold.hull import HULLS, HullOptions
 from geounfold.quality import NEIGHBOURS
 from geounfold.sheet import SheetOptions
 from geounfold.split import SPLITS
@@ -81,7 +81,7 @@ class UnfoldOptions:
     def __post_init__(self) -> None:
         _one_of("method", self.method, METHODS)
         _one_of("flattener", self.flattener, FLATTENERS)
-        _one_of("hull", self.hull, ("auto", "alpha", "ball_pivoting", "poisson", "density"))
+        _one_of("hull", self.hull, ("auto", *HULLS))
         _one_of("split", self.split, SPLITS)
         _one_of("datum", self.datum, DATUMS)
         up = np.asarray(self.up, dtype=np.float64)

@@ -55,6 +55,7 @@ def fit_body(
     inset: float,
     flatten: Flatten,
     options: SheetOptions,
+    datum: str = "mid",
 ) -> SheetResult:
     """Return the control mesh of a split body by the sheet method, and what led to it.
 
@@ -72,6 +73,8 @@ def fit_body(
         See Flatten.
     options : SheetOptions
         See there.
+    datum : str
+        Which surface is flat: mid, top, bottom or proportional.
 
     Raises
     ------
@@ -86,5 +89,5 @@ def fit_body(
     samples = Samples(split.mesh.V, medial.normals, variance, inset)
     fitted = fit_sheet(medial, samples, points, options.fit)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
-    mesh = build_control(fitted, horizons, points, flatten, options.control)
+    mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh)

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geounfold.backends.igl import TetIndex
-from geounfold.control import ControlMesh
+from geounfold.control import ControlMesh, Datum
 from geounfold.flattening._result import Flattening
 from geounfold.geometry import lengths, unique_edges
 from geounfold.mesh import Floats, Ints, TetMesh, TriMesh
 from geounfold.sheet.fit import FittedSheet
 from geounfold.sheet.footprint import Footprint, footprint, principal_direction
 from geounfold.sheet.horizons import Horizons
-from geounfold.sheet.layers import FRACTIONS, Layers, bad_nodes, neighbour_mean, shrink
+from geounfold.sheet.layers import Layers, bad_nodes, neighbour_mean, shrink
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
 Flatten = Callable[[TriMesh, Floats | None, Floats | None], Flattening]
@@ -55,44 +55,22 @@ class SheetMesh:
     flattenings : dict of Flattening
         The mid surface (``mid``) and the parallel surfaces above and below it (``top``,
         ``bottom``), over the same footprint, as they were flattened.
-    heights : (2, n) float
-        Bottom's and top's signed offset at the footprint's nodes.
-    weight : (n,) float
-        Blocks around each node.
     layers : Layers
         The prisms.
     rung : str
         Last rung of the ladder that was needed: constant, capped or shrunk.
     shrinks : int
         Steps of the shrinking rung.
+    surfaces : dict of (TriMesh, TriMesh)
+        Mid, top and bottom surface, folded and unfolded, over the footprint.
     """
 
     control: ControlMesh
     flattenings: dict[str, Flattening]
-    heights: Floats
-    weight: Floats
     layers: Layers
     rung: str
     shrinks: int
-
-    def surfaces(self, control: ControlMesh) -> dict[str, tuple[TriMesh, TriMesh]]:
-        """Return mid, top and bottom surface, folded and unfolded, over the footprint.
-
-        ``control`` is this control mesh with any datum: unfolded z is linear in height.
-        """
-        layers, n = self.layers, len(self.layers.P)
-        middle = len(FRACTIONS) // 2
-        z = control.unfolded.V[:, 2].reshape(len(FRACTIONS), n)
-        rate = (z[-1] - z[middle]) / layers.up
-        bottom, top = self.heights
-        out = {}
-        for name, height in (("mid", np.zeros(n)), ("top", top), ("bottom", bottom)):
-            slope = np.where(height[:, None] >= 0, layers.slope_up, layers.slope_down)
-            flat = layers.flat + np.abs(height)[:, None] * slope
-            unfolded = np.column_stack([flat, z[middle] + rate * height])
-            folded = layers.P + height[:, None] * layers.normal
-            out[name] = (TriMesh(folded, layers.F), TriMesh(unfolded, layers.F))
-        return out
+    surfaces: dict[str, tuple[TriMesh, TriMesh]]
 
 
 def arc_lengths(V: Floats, normal: Floats, F: Ints) -> Floats:
@@ -237,6 +215,7 @@ def build_control(
     points: Floats,
     flatten: Flatten,
     options: ControlOptions,
+    datum: str = "mid",
 ) -> SheetMesh:
     """Return the control mesh that holds the blocks, in both spaces (see SheetMesh).
 
@@ -256,6 +235,8 @@ def build_control(
         See Flatten.
     options : ControlOptions
         See there.
+    datum : str
+        Which surface is flat; see Datum.
     """
     sheet = fitted.sheet
     foot = block_feet(fitted, points, reach=10.0)
@@ -282,13 +263,27 @@ def build_control(
         offsets[1],
     )
     layers, rung, shrinks = _climb(layers, follow, constant, points, options)
-    bottom, top = horizons.heights(prints.U)
-    control = _control(layers, bottom, top)
-    heights = np.stack([bottom, top])
-    return SheetMesh(control, flat.flattenings, heights, prints.weight, layers, rung, shrinks)
+    slip = sheet.grid.value(fitted.slip, prints.U)
+    bottom, top = horizons.crossings(prints.U, slip)
+    means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
+    flat_datum = Datum(datum, means[0], means[1])
 
+    def unfolded(height: Floats) -> tuple[Floats, Floats]:
+        """Return unfolded vertices and stratigraphic coordinate at heights over the nodes."""
+        low, high = horizons.heights(prints.U - height[:, None] * slip)
+        plane = layers.flat_at(height)
+        z = flat_datum.z(height, low, high)
+        return np.column_stack([plane, z]), (height - low) / (high - low)
 
-def _control(layers: Layers, bottom: Floats, top: Floats) -> ControlMesh:
+    surfaces = {}
+    for name, height in (("mid", np.zeros(len(top))), ("top", top), ("bottom", bottom)):
+        folded = layers.P + height[:, None] * layers.normal
+        surfaces[name] = (TriMesh(folded, prints.F), TriMesh(unfolded(height)[0], prints.F))
     T = layers.tets()
-    stratigraphic = np.concatenate([(q - bottom) / (top - bottom) for q in layers.heights])
-    return ControlMesh(TetMesh(layers.folded, T), TetMesh(layers.unfolded, T), stratigraphic)
+    vertices, stratigraphic = zip(*(unfolded(q) for q in layers.heights), strict=True)
+    control = ControlMesh(
+        TetMesh(layers.folded, T),
+        TetMesh(np.concatenate(vertices), T),
+        np.concatenate(stratigraphic),
+    )
+    return SheetMesh(control, flat.flattenings, layers, rung, shrinks, surfaces)

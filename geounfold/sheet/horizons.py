@@ -1,4 +1,4 @@
-"""Top and bottom as heights over the mid surface, for the stratigraphic coordinate."""
+"""Top and bottom as heights over the flat mid surface, for the stratigraphic coordinate."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from geounfold.mesh import Floats
 from geounfold.sheet.fit import FittedSheet, Samples, unbiased_heights
 from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
+from geounfold.sheet.surface import near_any
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,34 +18,51 @@ class HorizonOptions:
     """How top and bottom are fitted; lengths in blocks.
 
     ``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull normal
-    and the mid surface's; ``misfit``: largest departure from the half thickness.
+    and the mid surface's, below which a sample is rim; ``erosion``: distance kept from the
+    rim, where hulls are rounded; ``misfit``: largest departure from the half thickness;
+    ``stiffness``: pull towards the half thickness where there are no samples.
     """
 
     smooth: float = 1.5
-    agree: float = 0.6
+    agree: float = 0.9
+    erosion: float = 0.5
     misfit: float = 2.5
+    stiffness: float = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Horizons:
-    """Heights of the hanging wall and the footwall over the mid surface's parameters.
+    """Heights of the hanging wall and the footwall over the flat mid surface.
 
     Attributes
     ----------
     grid : SplineGrid
-        Basis in U.
+        Basis in the unfolded parameters u = U - t slip(U).
     top, bottom : (grid.size,) float
-        Coefficients of the signed offsets of top and bottom along the mid surface's normal.
+        Coefficients of the signed heights of top and bottom.
     """
 
     grid: SplineGrid
     top: Floats
     bottom: Floats
 
-    def heights(self, U: Floats) -> tuple[Floats, Floats]:
-        """Return the bottom's and the top's offset at U (n, 2); at least 0.3 block apart."""
-        top, bottom = self.grid.value(self.top, U), self.grid.value(self.bottom, U)
+    def heights(self, u: Floats) -> tuple[Floats, Floats]:
+        """Return the bottom's and the top's height at u (n, 2); at least 0.3 block apart."""
+        top, bottom = self.grid.value(self.top, u), self.grid.value(self.bottom, u)
         return bottom, np.maximum(top, bottom + 0.3)
+
+    def crossings(self, U: Floats, slip: Floats) -> tuple[Floats, Floats]:
+        """Return where normals of the mid surface at U (n, 2) meet bottom and top, (n,) each.
+
+        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by iteration.
+        """
+        found = []
+        for side in (0, 1):
+            t = self.heights(U)[side]
+            for _ in range(12):
+                t = self.heights(U - t[:, None] * slip)[side]
+            found.append(t)
+        return found[0], found[1]
 
 
 def fit_horizons(
@@ -57,18 +75,25 @@ def fit_horizons(
     side = np.sign(cos)
     height = unbiased_heights(sheet, foot, side, samples)
     flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
-    expected = np.maximum(grid.value(fitted.half, flat), 0.2)
-    bending = grid.energy(2)
+    rim = near_any(samples.points, np.abs(cos) < options.agree, options.erosion)
     nodes, _ = sheet.samples()
     P = grid.basis(nodes)
-    prior = np.maximum(P @ fitted.half, 0.2)
-    heights = []
+    half = _as_spline(P, np.maximum(grid.value(fitted.half, nodes), 0.2))
+    expected = grid.value(half, flat)
+    bending = (options.smooth / knots) ** 4 * grid.energy(2)
+    still = options.stiffness * (P.T @ P) + 1e-12 * sp.eye_array(grid.size)
+    found = []
     for s in (1.0, -1.0):
-        use = (foot.miss < 0.1) & (s * cos > options.agree)
+        use = (foot.miss < 0.1) & (side == s) & ~rim
         use &= np.abs(s * foot.t - expected) < options.misfit
-        B = grid.basis(foot.U[use])
-        w = density_weights(foot.U[use], knots) if use.any() else np.empty(0)
-        K = B.T @ sp.diags_array(w) @ B + (options.smooth / knots) ** 4 * bending + 1e-6 * (P.T @ P)
-        rhs = B.T @ (w * height[use]) + 1e-6 * (P.T @ (s * prior))
-        heights.append(spd_solver(K + 1e-12 * sp.eye_array(grid.size))(rhs))
-    return Horizons(grid, heights[0], heights[1])
+        B = grid.basis(flat[use])
+        w = density_weights(flat[use], knots) if use.any() else np.empty(0)
+        K = B.T @ sp.diags_array(w) @ B + bending + still
+        rest = spd_solver(K)(B.T @ (w * (height[use] - s * expected[use])))
+        found.append(rest + s * half)
+    return Horizons(grid, found[0], found[1])
+
+
+def _as_spline(P: sp.csr_array, values: Floats) -> Floats:
+    """Return the coefficients whose spline takes values at the nodes of basis P."""
+    return spd_solver(P.T @ P + 1e-9 * sp.eye_array(P.shape[1]))(P.T @ values)

@@ -58,11 +58,13 @@ class Layers:
     @property
     def unfolded(self) -> Floats:
         """Unfolded vertices, layer by layer, (5 n, 3); z is the height."""
-        rows = []
-        for f, q in zip(FRACTIONS, self.heights, strict=True):
-            slope = self.slope_up if f >= 0 else self.slope_down
-            rows.append(np.column_stack([self.flat + np.abs(q)[:, None] * slope, q]))
-        return np.concatenate(rows)
+        return np.concatenate([np.column_stack([self.flat_at(q), q]) for q in self.heights])
+
+    def flat_at(self, height: Floats) -> Floats:
+        """Return the unfolded position in the plane (n, 2) at signed heights over the nodes."""
+        slope = np.where(height[:, None] >= 0, self.slope_up, self.slope_down)
+        out: Floats = self.flat + np.abs(height)[:, None] * slope
+        return out
 
     def tets(self) -> Ints:
         """Return the tetrahedra, right-handed where upright."""

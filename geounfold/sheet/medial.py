@@ -51,7 +51,7 @@ class MedialSheet:
     mesh : TriMesh
         Medial points, (n, 3), joined as the top's faces are.
     uv : (n, 2) float
-        Isometric parameters, along their principal axes.
+        Isometric parameters, turned towards the working axes.
     half : (n,) float
         Half thickness.
     trusted : (n,) bool
@@ -158,7 +158,7 @@ def medial_sheet(
     uv = flatten(medial, flatten(part, None))
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
-    return MedialSheet(medial, _principal(uv), half, trusted, core, at_vertices)
+    return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, core, at_vertices)
 
 
 def _one_sheet(F: Ints, faces: Ints) -> Ints:
@@ -186,11 +186,17 @@ def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
     return np.asarray(distance > domain * split.median_thickness)
 
 
-def _principal(uv: Floats) -> Floats:
-    """Return parameters turned (never mirrored) to their principal axes, centred."""
+def _oriented(uv: Floats, V: Floats) -> Floats:
+    """Return parameters centred and turned, never mirrored, towards the working axes.
+
+    Of the isometry of the plane nearest to the map uv -> V, the first working axis (the
+    body's longest) has no component along the second parameter, and a positive one along the
+    first: flat x runs where the folded body's first axis does.
+    """
     centred = uv - uv.mean(axis=0)
-    _, _, axes = np.linalg.svd(centred, full_matrices=False)
-    axes[0] *= 1.0 if axes[0][np.abs(axes[0]).argmax()] > 0 else -1.0
-    axes[1] = [-axes[0, 1], axes[0, 0]]
-    out: Floats = centred @ axes.T
+    left, _, right = np.linalg.svd((V - V.mean(axis=0)).T @ centred, full_matrices=False)
+    x = (left @ right)[0]
+    length = float(np.linalg.norm(x))
+    cos, sin = x / length if length > 1e-6 else np.array([1.0, 0.0])
+    out: Floats = centred @ np.array([[cos, -sin], [sin, cos]])
     return out

@@ -183,7 +183,8 @@ def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
 
 
 def _over(V: Floats) -> Floats:
-    return V * np.array([1.0, -1.0, -1.0])
+    out: Floats = V * np.array([1.0, -1.0, -1.0])
+    return out
 
 
 def _turned_over(result: BodyFit) -> BodyFit:

@@ -1,9 +1,10 @@
-"""Every flattener on the same surfaces: one tidy table."""
+"""Every flattener on the same surfaces, given or those of a body: one tidy table."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -11,6 +12,10 @@ import pandas as pd
 from geounfold.errors import GeounfoldError, OptionError
 from geounfold.flattening import FLATTENERS, Flattening, flatten, measures
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.options import UnfoldOptions
+from geounfold.pipeline import Progress, unfold
+
+Surface = TriMesh | tuple[Floats, Ints]
 
 #: Columns of the table, in order.
 COLUMNS = (
@@ -32,21 +37,33 @@ COLUMNS = (
 )
 
 
+_ORDER = ("top", "bottom", "mid")
+
+
 def compare(
-    surfaces: TriMesh | tuple[Floats, Ints] | Mapping[str, TriMesh | tuple[Floats, Ints]],
+    points_or_mesh: Floats | pd.DataFrame | Surface | Mapping[str, Surface],
     flatteners: str | Iterable[str] = "all",
     options: Mapping[str, Any] | None = None,
+    *,
+    unfolding: UnfoldOptions | None = None,
+    progress: Progress | None = None,
 ) -> pd.DataFrame:
     """Flatten surfaces by several methods and measure what each did to them.
 
     Parameters
     ----------
-    surfaces : TriMesh, (V, F) or a mapping of names to them
-        What to flatten; a single surface is named ``surface``.
+    points_or_mesh : (n, 3) array, DataFrame, TriMesh, (V, F) or a mapping of names to surfaces
+        A body given by its block centroids, whose top, bottom and mid surface are compared; or
+        what to flatten, where a single surface is named ``surface``.  A tuple is a (V, F) pair.
     flatteners : str or names
         ``all``, one name of FLATTENERS or several.
     options : mapping, optional
         Options of some flatteners, by their names.
+    unfolding : UnfoldOptions, optional
+        How the body's surfaces are found; defaults without.  An uncertified control mesh is no
+        obstacle, since surfaces alone are needed.
+    progress : callable, optional
+        Called with every stage's name as it starts.
 
     Returns
     -------
@@ -59,7 +76,9 @@ def compare(
     Raises
     ------
     OptionError
-        A flattener that does not exist.
+        A flattener that does not exist, or options of unfolding where surfaces are given.
+    InputError
+        Points that are no body; see ``unfold``.
 
     Examples
     --------
@@ -72,14 +91,31 @@ def compare(
     names = _names(flatteners)
     if options is not None:
         _names(options)
-    named = surfaces if isinstance(surfaces, Mapping) else {"surface": surfaces}
-    rows = [
-        _row(label, as_trimesh(mesh), name, (options or {}).get(name))
-        for label, mesh in named.items()
-        for name in names
-    ]
+    rows = []
+    for label, mesh in _surfaces(points_or_mesh, unfolding, progress).items():
+        for name in names:
+            if progress is not None:
+                progress(f"{label} surface by {name}")
+            rows.append(_row(label, as_trimesh(mesh), name, (options or {}).get(name)))
     table = pd.DataFrame(rows, columns=list(COLUMNS))
     return table.astype({"flips": "Int64", "iterations": "Int64"})
+
+
+def _surfaces(
+    given: Floats | pd.DataFrame | Surface | Mapping[str, Surface],
+    unfolding: UnfoldOptions | None,
+    progress: Progress | None,
+) -> Mapping[str, Surface]:
+    """Return named surfaces: those given, or top, bottom and mid of the body given."""
+    if isinstance(given, TriMesh | tuple):
+        given = {"surface": given}
+    if not isinstance(given, Mapping):
+        chosen = replace(unfolding or UnfoldOptions(), allow_uncertified=True)
+        pairs = unfold(given, chosen, progress=progress).surfaces
+        return {name: pairs[name].folded for name in _ORDER if name in pairs}
+    if unfolding is not None:
+        raise OptionError("options of unfolding need a body's points, but surfaces are given")
+    return given
 
 
 def _names(flatteners: str | Iterable[str]) -> list[str]:

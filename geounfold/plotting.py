@@ -54,7 +54,13 @@ _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z i
 _QUADS = np.array(
     [[[0, 1, 3, 2], [4, 6, 7, 5]], [[0, 4, 5, 1], [2, 3, 7, 6]], [[0, 2, 6, 4], [1, 5, 7, 3]]]
 )
-_LIT: dict[str, Any] = {"show_edges": True, "line_width": 0.5, "ambient": 0.35, "diffuse": 0.65}
+_LIT: dict[str, Any] = {
+    "show_edges": True,
+    "edge_opacity": 0.25,
+    "line_width": 0.5,
+    "ambient": 0.35,
+    "diffuse": 0.65,
+}
 _SHADE = np.array([0.74, 0.86, 1.0])  # brightness of faces across x, y and z
 _MAX_CELLS = 30_000_000  # of the grid that hidden blocks are found with: 30 MB
 
@@ -372,6 +378,28 @@ def extents(points: Floats) -> str:
     return " × ".join(f"{s:.0f}" if s >= 100 else f"{s:.3g}" for s in size)
 
 
+def draw_body(
+    points: Floats,
+    values: Floats,
+    label: str,
+    *,
+    limits: Limits | None = None,
+    colours: str = "viridis",
+    bands: int = 256,
+    options: ViewOptions | None = None,
+) -> Figure:
+    """Draw one body; for the parameters see `draw_bodies`."""
+    options = options or ViewOptions()
+    P, v = check_body(points, values)
+    limits = limits or colour_limits(v)
+    figure = _figure(9, 8.2 * options.size[1] / options.size[0] + 0.3)
+    ax = figure.subplots()
+    image = render_body(P, v, limits, colours=colours, bands=bands, options=options)
+    _show(ax, image, extents(P))
+    _colour_bar(figure, [ax], limits, colours, bands, label)
+    return figure
+
+
 def draw_bodies(
     folded: Floats,
     unfolded: Floats,
@@ -381,6 +409,7 @@ def draw_bodies(
     limits: Limits | None = None,
     colours: str = "viridis",
     bands: int = 256,
+    titles: tuple[str, str] = ("folded", "unfolded"),
     options: ViewOptions | None = None,
 ) -> Figure:
     """Draw a body folded and unfolded, side by side, in the same colours.
@@ -395,6 +424,8 @@ def draw_bodies(
         What the values are, with their unit.
     limits : (float, float), optional
         Values of the first and last colour; 1st and 99th percentile by default.
+    titles : (str, str)
+        What the two spaces are called.
     colours, bands, options
         See `render_body`.
     """
@@ -405,7 +436,7 @@ def draw_bodies(
     figure = _figure(12.5, 12.5 * 0.46 * options.size[1] / options.size[0] + 0.3)
     axes = figure.subplots(1, 2)
     look: dict[str, Any] = {"colours": colours, "bands": bands, "sides": block_sides(checked[0][0])}
-    for ax, (P, v), title in zip(axes, checked, ("folded", "unfolded"), strict=True):
+    for ax, (P, v), title in zip(axes, checked, titles, strict=True):
         image = render_body(P, v, limits, options=options, **look)
         _show(ax, image, f"{title}: {extents(P)}")
     _colour_bar(figure, list(axes), limits, colours, bands, label)

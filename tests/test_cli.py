@@ -49,7 +49,6 @@ class FakeUnfolding(FakeMap):
         self.points, self.location = carried.points, carried.location
         self.stratigraphic = carried.stratigraphic
         self.columns = {"volume_ratio": np.ones(len(points))}
-        self.surfaces = {"top": SimpleNamespace(folded=(points, [[0, 1, 2]]))}
         self.warnings = warnings
 
     def summary(self) -> dict[str, Any]:
@@ -268,20 +267,29 @@ def test_map_there_and_back(points: Path, tmp_path: Path, calls: list[dict[str, 
 
 
 def test_compare(
-    points: Path, tmp_path: Path, calls: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+    points: Path,
+    tmp_path: Path,
+    calls: list[dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     asked: list[Any] = []
 
-    def compare(surfaces: Any, flatteners: Any) -> pd.DataFrame:
-        asked.append((list(surfaces), flatteners))
-        return pd.DataFrame({"flattener": ["spring"], "flips": [0], "error": ["too, long"]})
+    def compare(given: Any, flatteners: Any, **how: Any) -> pd.DataFrame:
+        asked.append((type(given).__name__, flatteners, how.get("unfolding")))
+        row = {"surface": "top", "flattener": "spring", "flips": 0, "error": "too, long"}
+        return pd.DataFrame([row])
 
     _replace(monkeypatch, "comparison", compare=compare)
     (tmp_path / "t.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert main(["compare", "p.csv", "-o", "t.csv"]) == 0
+    assert main(["compare", "p.csv", "-o", "t.csv", "--hull", "alpha"]) == 0
+    assert "spring failed on the top surface: too, long" in capsys.readouterr().err
     assert main(["compare", "t.obj", "--flatteners", "spring,arap", "-o", "t2.csv"]) == 0
-    assert asked == [(["top"], "all"), (["surface"], ["spring", "arap"])]
-    assert (tmp_path / "t.csv").read_text() == 'flattener,flips,error\nspring,0,"too, long"\n'
+    assert asked == [("ndarray", "all", {"hull": "alpha"}), ("TriMesh", ["spring", "arap"], None)]
+    written = (tmp_path / "t.csv").read_text()
+    assert written == 'surface,flattener,flips,error\ntop,spring,0,"too, long"\n'
+    assert main(["compare", "t.obj", "--hull", "alpha", "-o", "t3.csv"]) == 2
+    assert "--hull needs a table of points; t.obj is one surface" in capsys.readouterr().err
 
 
 def test_quality(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -309,14 +317,25 @@ def test_quality(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "--list"]) == 0
-    cases = capsys.readouterr().out.split()
-    assert {"sim_case_1", "sim_case_2"} <= set(cases)
+    cases = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert {"sim_case_1", "sim_case_2"} <= {name for name, _description in cases}
     out = tmp_path / "thin.parquet"
     pytest.importorskip("pyarrow")
     assert main(["simulate", "sim_case_1", "-o", str(out)]) == 0
     assert {"centroid_x", "true_z"} <= set(pd.read_parquet(out))
     assert main(["simulate", "no_such_case", "-o", str(tmp_path / "x.csv")]) == 2
     assert "sim_case_1" in capsys.readouterr().err
+    assert main(["simulate", "--list", "-o", str(tmp_path / "x.csv")]) == 2
+    assert "--list stands alone" in capsys.readouterr().err
+
+
+def test_simulate_writes_four_decimals_and_about_so_many_blocks(tmp_path: Path) -> None:
+    out = tmp_path / "small.csv"
+    assert main(["simulate", "sim_case_1", "--blocks", "2000", "-o", str(out)]) == 0
+    rows = out.read_text().splitlines()[1:]
+    assert 1600 < len(rows) < 2400  # whole blocks, six layers: measured 1,944
+    assert max(len(value.partition(".")[2]) for row in rows for value in row.split(",")) == 4
+    assert main(["simulate", "sim_case_1", "--blocks", "0", "-o", str(tmp_path / "x.csv")]) == 2
 
 
 def test_view_asks_for_numbers(
@@ -335,7 +354,8 @@ def test_view_draws_both_spaces(
     _replace(
         monkeypatch,
         "plotting",
-        draw_bodies=lambda _p, _q, _values, label: drawn.append(label),
+        draw_body=lambda _p, _values, label: drawn.append((label,)),
+        draw_bodies=lambda _p, _q, _values, label, titles: drawn.append((label, *titles)),
         draw_control=lambda control: drawn.append(control.folded.V.tolist()),
         png=lambda _figure: b"picture",
     )
@@ -346,11 +366,28 @@ def test_view_draws_both_spaces(
     saved = SimpleNamespace(control=ControlMesh(tet, tet, corners[:, 2]), frame=frame)
     monkeypatch.setattr(geounfold.mapping, "load", lambda _: saved)
     assert main(["unfold", "p.csv", "-o", "out.csv"]) == 0
-    assert main(["view", "out.csv", "-o", "a.png"]) == 0
-    assert main(["view", "out.csv", "-o", "b.png", "--colour", "stratigraphic"]) == 0
+    (tmp_path / "true.csv").write_text("x,y,z,true_x,true_y,true_z\n1,2,3,1,2,0\n4,5,6,4,5,0\n")
+    unfolded = ",".join(RESULTS[:3])
+    for number, words in enumerate(
+        (
+            ["p.csv"],
+            ["out.csv"],
+            ["out.csv", "--colour", "ZC"],
+            ["out.csv", "--columns", unfolded],
+            ["true.csv"],
+        )
+    ):
+        assert main(["view", *words, "-o", f"{number}.png"]) == 0
     assert main(["view", "m.npz", "-o", "c.png"]) == 0
     in_world = [[100, 0, 0], [90, 0, 0], [100, 10, 0], [100, 0, -10]]
-    assert drawn == ["ZC", "stratigraphic", in_world]
+    assert drawn == [
+        ("ZC",),
+        ("stratigraphic", "folded", "unfolded"),
+        ("ZC", "folded", "unfolded"),
+        ("stratigraphic",),
+        ("z", "folded", "truth"),
+        in_world,
+    ]
     assert (tmp_path / "c.png").read_bytes() == b"picture"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_tabl
 
 if TYPE_CHECKING:
     from geounfold.mapping import Carried
-    from geounfold.mesh import TriMesh
+    from geounfold.mesh import Floats, TriMesh
     from geounfold.options import UnfoldOptions
     from geounfold.pipeline import Unfolding
 
@@ -31,6 +30,7 @@ _PICTURE = (".png",)
 _UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
 _FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
 _TRUE: Triple = ("true_x", "true_y", "true_z")
+_MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours")
 
 
 def unfold(args: Namespace, console: Console) -> None:
@@ -106,30 +106,34 @@ def carry(args: Namespace, console: Console) -> None:
 
 
 def compare(args: Namespace, console: Console) -> None:
-    """Try flatteners on one body and write a table of how they did."""
+    """Try flatteners on one body or surface and write a table of how they did."""
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)}, [args.points], overwrite=args.overwrite
     )
-    surfaces = _surfaces(args, console)
+    names = [name.strip() for name in args.flatteners.split(",")]
+    chosen: str | list[str] = "all" if names == ["all"] else names
+    how: dict[str, Any] = {"progress": console.stage}
+    if ending(Path(args.points)) in MESH_ENDINGS:
+        given: TriMesh | Floats = read_surface(args.points)
+        _refuse_model_options(args)
+    else:
+        how["unfolding"] = _options(args)
+        given = _read(args.points, args, console).points
     from geounfold import comparison
 
-    names = [name.strip() for name in args.flatteners.split(",")]
-    console.stage("comparing flatteners")
-    frame = comparison.compare(surfaces, "all" if names == ["all"] else names)
+    frame = comparison.compare(given, chosen, **how)
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
+    for _, row in frame[frame["error"] != ""].iterrows():
+        console.warn(f"{row['flattener']} failed on the {row['surface']} surface: {row['error']}")
     console.done(f"{len(frame)} rows written into {args.output}")
 
 
-def _surfaces(args: Namespace, console: Console) -> dict[str, TriMesh]:
-    """Return the surface of a mesh file, or those of a body: top, bottom and mid."""
-    if ending(Path(args.points)) in MESH_ENDINGS:
-        return {"surface": read_surface(args.points)}
-    table = _read(args.points, args, console)
-    from geounfold import pipeline
-
-    result = pipeline.unfold(table.points, _options(args), progress=console.stage)
-    return {name: pair.folded for name, pair in result.surfaces.items()}
+def _refuse_model_options(args: Namespace) -> None:
+    """Raise where options that shape a body's surfaces are given beside a surface."""
+    given = [f"--{name}" for name in _MODEL if hasattr(args, name)]
+    if given:
+        raise OptionError(f"{given[0]} needs a table of points; {args.points} is one surface")
 
 
 def quality(args: Namespace, console: Console) -> None:
@@ -171,15 +175,19 @@ def simulate(args: Namespace, console: Console) -> None:
     from geounfold import synthetic
 
     if args.list:
-        for name in synthetic.CASES:
-            sys.stdout.write(f"{name}\n")
+        if args.case is not None or args.output is not None:
+            raise OptionError("--list stands alone: it neither takes a CASE nor writes a file")
+        width = max(map(len, synthetic.CASES))
+        for name, spec in synthetic.CASES.items():
+            sys.stdout.write(f"{name:<{width}}  {spec.description}\n")
         return
     if args.case is None or args.output is None:
         raise OptionError("simulate needs CASE and -o OUT, or --list")
+    blocks = _count(args.blocks, "--blocks")
     outputs = Outputs.planned({"--output": (args.output, TABLE_ENDINGS)}, overwrite=args.overwrite)
-    if args.case not in synthetic.CASES:
-        raise OptionError(f"no case '{args.case}'; there are {', '.join(synthetic.CASES)}")
-    frame = synthetic.simulate(args.case).frame()
+    console.stage("simulating")
+    body = synthetic.simulate(args.case, blocks=blocks)
+    frame = body.frame(4)
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
     console.done(f"{len(frame)} points written into {args.output}")
@@ -214,8 +222,8 @@ def _draw_map(path: str, console: Console) -> bytes:
 
 
 def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
-    """Return a picture of points, coloured by a column or by height."""
-    label = colour or table.columns[2]
+    """Return a picture of points, coloured by a column, by layer or by height."""
+    label = colour or _default_colour(table)
     values = table.numbers(label)
     if not np.isfinite(values).all():
         missing = np.flatnonzero(~np.isfinite(values))
@@ -223,18 +231,23 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
             f"{table.source}: column '{label}' has {len(missing)} missing or infinite values, "
             f"the first in data row {missing[0] + 1}; choose a column that every row has"
         )
-    twin = table.points
-    if set(_UNFOLDED) <= set(table.frame.columns):
-        twin = np.column_stack([table.numbers(name) for name in _UNFOLDED])
     from geounfold import plotting
 
     console.stage("drawing")
-    if twin is table.points:
-        image = plotting.render_body(twin, values, plotting.colour_limits(values))
-        stream = BytesIO()
-        plotting.require("matplotlib.image").imsave(stream, image, format="png")
-        return stream.getvalue()
-    return plotting.png(plotting.draw_bodies(table.points, twin, values, label))
+    for names, title in ((_UNFOLDED, "unfolded"), (_TRUE, "truth")):
+        if set(names) <= set(table.frame.columns) and names != table.columns:
+            twin = np.column_stack([table.numbers(name) for name in names])
+            titles = ("unfolded" if table.columns == _UNFOLDED else "folded", title)
+            return plotting.png(
+                plotting.draw_bodies(table.points, twin, values, label, titles=titles)
+            )
+    return plotting.png(plotting.draw_body(table.points, values, label))
+
+
+def _default_colour(table: PointTable) -> str:
+    """Return the column to colour by: of a result, how high in the layer; else the height."""
+    result = {"stratigraphic", *_UNFOLDED} <= set(table.frame.columns)
+    return "stratigraphic" if result else table.columns[2]
 
 
 def _check_pictures(console: Console) -> None:
@@ -289,10 +302,11 @@ def _options(args: Namespace) -> UnfoldOptions:
         "body": _body,
         "neighbours": lambda text: _count(text, "--neighbours"),
     }
-    names = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours")
-    given = {n: getattr(args, n) for n in names if hasattr(args, n)}
+    given = {n: getattr(args, n) for n in _MODEL if hasattr(args, n)}
     values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
-    return UnfoldOptions(allow_uncertified=hasattr(args, "allow_uncertified"), **values)
+    if hasattr(args, "allow_uncertified"):
+        values["allow_uncertified"] = True
+    return UnfoldOptions(**values)
 
 
 def _direction(text: str) -> tuple[float, float, float]:
@@ -319,15 +333,19 @@ def _count(text: str | None, option: str) -> int | None:
     return int(text)
 
 
-def _print_figures(figures: dict[str, Any], indent: str = "") -> None:
-    """Print figures as aligned lines, groups under their names."""
-    width = max((len(name) for name in figures), default=0)
+def _print_figures(figures: dict[str, Any]) -> None:
+    """Print figures as aligned lines, groups of statistics as a table below the others."""
+    width = max(map(len, figures))
+    groups = {name: value for name, value in figures.items() if isinstance(value, dict)}
     for name, value in figures.items():
-        if isinstance(value, dict):
-            sys.stdout.write(f"{indent}{name}\n")
-            _print_figures(value, indent + "  ")
-        else:
-            sys.stdout.write(f"{indent}{name:<{width}}  {_figure(value)}\n")
+        if name not in groups:
+            sys.stdout.write(f"{name:<{width}}  {_figure(value)}\n")
+    for number, (name, group) in enumerate(groups.items()):
+        if number == 0:
+            head = "".join(f"{key:>13}" for key in group)
+            sys.stdout.write(f"\n{'':<{width}}{head}\n")
+        cells = "".join(f"{_figure(value):>13}" for value in group.values())
+        sys.stdout.write(f"{name:<{width}}{cells}\n")
 
 
 def _figure(value: Any) -> str:

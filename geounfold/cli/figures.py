@@ -28,8 +28,9 @@ def quality_figures(
     Returns
     -------
     dict
-        Without a truth: epsilon with the folded body's neighbours kept and with each cloud's
-        own, and the ratios of far distances. With one: see `quality.TruthQuality`.
+        NMD of each cloud with its own neighbours, epsilon with the folded body's neighbours kept
+        and with each cloud's own; without a truth the ratios of far distances, with one what
+        `quality.TruthQuality` holds.
 
     Raises
     ------
@@ -38,12 +39,18 @@ def quality_figures(
     """
     k = quality.NEIGHBOURS if neighbours is None else neighbours
     facts: dict[str, Any] = {"points": len(folded), "neighbours": k}
+    clouds = {"nmd_folded": folded, "nmd_unfolded": unfolded}
     if truth is not None:
-        return facts | quality.compare_with_truth(folded, unfolded, truth, k).summary()
+        clouds["nmd_truth"] = truth
+    for name, cloud in clouds.items():
+        facts[name] = _statistics(quality.nmd(cloud, quality.neighbours(cloud, k)))
+    own = {"epsilon_own_neighbours": _statistics(quality.epsilon(folded, unfolded, k, "own"))}
+    if truth is not None:
+        return facts | quality.compare_with_truth(folded, unfolded, truth, k).summary() | own
     ratios = quality.distance_ratios(folded, unfolded, quality.random_pairs(len(folded)))
-    own = quality.epsilon(folded, unfolded, k, "own")
-    return facts | {
-        "epsilon_folded": asdict(quality.Statistics.of(quality.epsilon(folded, unfolded, k))),
-        "epsilon_own_neighbours": asdict(quality.Statistics.of(own)),
-        "distances": asdict(quality.Statistics.of(np.abs(ratios - 1))),
-    }
+    epsilon = {"epsilon_folded": _statistics(quality.epsilon(folded, unfolded, k))}
+    return facts | epsilon | own | {"distances": _statistics(np.abs(ratios - 1))}
+
+
+def _statistics(values: Floats) -> dict[str, float]:
+    return asdict(quality.Statistics.of(values))

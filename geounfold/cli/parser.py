@@ -39,6 +39,33 @@ with --inverse:
 Every input column and row comes back in order. An input column called as a result is replaced
 in its place."""
 )
+_COMPARE = """\
+rows: the top, bottom and mid surface of a body, or the surface given, by each flattener
+columns:
+  area_error         E_s: relative difference of the triangles' areas
+  edge_strain        root mean square of the edges' relative change
+  area_distortion, angle_distortion, symmetric_dirichlet   1, 1 and 4 for an isometry
+  flips              triangles turned over
+  iterations, stop, seconds, note                          how it went
+  error              why there are no figures; empty where it worked"""
+_QUALITY = """\
+figures: mean, standard deviation, 95th percentile and maximum, or one number each
+  nmd_folded, nmd_unfolded, nmd_truth   mean distance to the neighbours, in the unit of the file
+  epsilon_folded     relative change of it, folded to unfolded, with the neighbours kept;
+                     a body left as it is scores 0
+  epsilon_own_neighbours                the same, with each file's own neighbours
+  distances          |ratio - 1| of far distances, unfolded over folded (or over the truth)
+with --truth:
+  epsilon_truth      relative change, truth to unfolded
+  rms                distance from the truth after the best rigid motion, never mirrored
+  spacing            of neighbours along x, y and z, unfolded over truth
+  ..._nothing        what leaving the body folded would score
+
+Rows of the files belong together one by one. Columns unfolded_x/y/z of UNFOLDED and true_x/y/z
+of W are taken first where they exist. All files must have the same unit."""
+_SIMULATE = """\
+columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z before folding, in
+metres, to four decimals. The same case gives the same file."""
 _EXIT = "exit status: 0 done, 2 input or options at fault, 1 anything else, 130 interrupted"
 
 
@@ -138,9 +165,9 @@ def _add_columns(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_model(parser: argparse.ArgumentParser) -> None:
-    """Add the options that become `UnfoldOptions`."""
-    group = parser.add_argument_group("method")
+def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
+    """Add the options that become `UnfoldOptions`, and return their group."""
+    group = parser.add_argument_group(title)
     given: dict[str, Any] = {"default": argparse.SUPPRESS}
     group.add_argument(
         "--method", metavar="M", help="sheet (default) or thesis: how the map is made", **given
@@ -174,12 +201,7 @@ def _add_model(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--neighbours", metavar="K", help="neighbours per block in NMD (default 26)", **given
     )
-    group.add_argument(
-        "--allow-uncertified",
-        action="store_true",
-        help="write the answer even where control tetrahedra are inverted",
-        **given,
-    )
+    return group
 
 
 def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -199,7 +221,12 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--bottom", metavar="B", help="the bottom surface")
     _add_columns(parser)
-    _add_model(parser)
+    _add_model(parser).add_argument(
+        "--allow-uncertified",
+        action="store_true",
+        default=argparse.SUPPRESS,
+        help="write the answer even where control tetrahedra are inverted",
+    )
 
 
 def _add_map(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -213,7 +240,7 @@ def _add_map(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(
-        commands, "compare", "try every flattener on the same surfaces of a body", common
+        commands, "compare", "try every flattener on the same surfaces", common, _COMPARE
     )
     parser.add_argument(
         "points",
@@ -225,7 +252,7 @@ def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
         "--flatteners", metavar="A,B,...", default="all", help="which ones (default all)"
     )
     _add_columns(parser)
-    _add_model(parser)
+    _add_model(parser, "how a body's surfaces are found")
 
 
 def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -234,8 +261,7 @@ def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:
         "quality",
         "measure an unfolding: NMD, epsilon, distance ratios, aligned RMS",
         common,
-        "Rows of the files belong together one by one. Columns unfolded_x/y/z of UNFOLDED and\n"
-        "true_x/y/z of W are taken first where they exist.",
+        _QUALITY,
     )
     parser.add_argument("folded", metavar="FOLDED", help=_TABLES)
     parser.add_argument("unfolded", metavar="UNFOLDED", help="the same points, unfolded")
@@ -249,18 +275,28 @@ def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:
 
 def _add_simulate(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(
-        commands, "simulate", "make a simulated folded body with its exact truth", common
+        commands, "simulate", "make a simulated folded body with its exact truth", common, _SIMULATE
     )
     parser.add_argument("case", metavar="CASE", nargs="?", help="which one")
-    parser.add_argument("--list", action="store_true", help="list the cases")
+    parser.add_argument("--list", action="store_true", help="list the cases and what they are")
     parser.add_argument("-o", "--output", metavar="OUT", help=_TABLES)
+    parser.add_argument(
+        "--blocks", metavar="N", help="grow or shrink the body in its plane to about N blocks"
+    )
 
 
 def _add_view(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(commands, "view", "draw points or a saved map into a picture", common)
     parser.add_argument(
-        "points", metavar="FILE", help=f"{_TABLES}, or a map .npz; an output shows both spaces"
+        "points",
+        metavar="FILE",
+        help=f"{_TABLES}, or a map .npz; a table that has unfolded_x/y/z or true_x/y/z too is "
+        "drawn in both spaces",
     )
     parser.add_argument("-o", "--output", metavar="PICTURE.png", required=True)
-    parser.add_argument("--colour", metavar="COLUMN", help="colour by a column of numbers")
+    parser.add_argument(
+        "--colour",
+        metavar="COLUMN",
+        help="colour by a column of numbers (default stratigraphic, or height)",
+    )
     _add_columns(parser)

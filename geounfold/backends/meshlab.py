@@ -15,13 +15,18 @@ import numpy as np
 from geounfold.errors import BackendError, MissingDependencyError
 from geounfold.mesh import Floats, Ints
 
+# What MeshLab says when a plugin, whose system library is missing, was left out on import.
+_ABSENT = ("Filter does not exists", "Unknown format")
+_CURE = "install OpenGL (Debian and Ubuntu: apt-get install libgl1 libopengl0)"
+
 
 def _pymeshlab() -> Any:
     try:
         import pymeshlab
     except ImportError as error:
         raise MissingDependencyError(
-            f"pymeshlab cannot be loaded ({error}); install it and the system library it names"
+            f"pymeshlab cannot be loaded ({error}); pip install pymeshlab, or where it names a "
+            f"system library, {_CURE}"
         ) from error
     return pymeshlab
 
@@ -43,7 +48,13 @@ def _apply(meshes: Any, name: str, **options: Any) -> None:
     try:
         meshes.apply_filter(name, **options)
     except ml.PyMeshLabException as error:
-        raise BackendError(f"MeshLab's {name} failed: {error}") from error
+        if _ABSENT[0] in str(error):
+            raise MissingDependencyError(f"MeshLab's {name} cannot be loaded: {_CURE}") from error
+        raise BackendError(f"MeshLab's {name} failed: {_one_line(error)}") from error
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _arrays(meshes: Any) -> tuple[Floats, Ints]:
@@ -162,12 +173,23 @@ def read_mesh(path: str | PathLike[str]) -> tuple[Floats, Ints]:
     """Return vertices (n, 3) and faces (m, 3) of a mesh file, polygons cut into triangles.
 
     The kind follows the ending; coordinates keep double precision where the file has it.
+
+    Raises
+    ------
+    BackendError
+        The file is damaged.
+    MissingDependencyError
+        The kind is unknown, as every one is where MeshLab's own library of kinds is not loaded.
     """
     ml = _pymeshlab()
     meshes = ml.MeshSet(verbose=False)
     try:
         meshes.load_new_mesh(fspath(path))
     except ml.PyMeshLabException as error:
-        details = str(error).rpartition("Error details:")[2]
-        raise BackendError(f"MeshLab cannot read it: {' '.join(details.split())}") from error
+        if _ABSENT[1] in str(error):
+            raise MissingDependencyError(
+                f"MeshLab cannot read {fspath(path)}: its readers cannot be loaded; {_CURE}"
+            ) from error
+        details = _one_line(error).rpartition("Error details:")[2]
+        raise BackendError(f"MeshLab cannot read it: {details.strip()}") from error
     return _arrays(meshes)

@@ -1,0 +1,69 @@
+"""MeshLab's door: what is missing is named with its cure, what fails is named in one line."""
+
+from __future__ import annotations
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geounfold.backends import meshlab
+from geounfold.errors import BackendError, MissingDependencyError
+
+V = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+F = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+class Refusal(Exception):  # noqa: N818  (named by the stub only)
+    """Stands for pymeshlab's PyMeshLabException."""
+
+
+@pytest.fixture
+def refuse(monkeypatch):
+    """Return a function that makes every filter and reader end with a message."""
+
+    def install(message):
+        def fail(*_words, **_options):
+            raise Refusal(message)
+
+        meshes = SimpleNamespace(add_mesh=lambda _mesh: None, apply_filter=fail, load_new_mesh=fail)
+        stub = SimpleNamespace(
+            PyMeshLabException=Refusal,
+            PureValue=float,
+            Mesh=lambda **_parts: None,
+            MeshSet=lambda verbose: meshes,
+        )
+        monkeypatch.setitem(sys.modules, "pymeshlab", stub)
+
+    return install
+
+
+def test_a_filter_left_out_for_want_of_opengl_names_the_package(refuse):
+    # As pymeshlab 2025.7 puts it on a machine without libOpenGL.so.0.
+    refuse(
+        "Failed to apply filter: meshing_isotropic_explicit_remeshing\n"
+        "Filter does not exists. Take a look at MeshSet.print_filter_list function."
+    )
+    with pytest.raises(MissingDependencyError, match=r"remeshing cannot be loaded: .*libopengl0"):
+        meshlab.remesh(V, F, 0.3, 2)
+    with pytest.raises(MissingDependencyError, match=r"close_holes cannot be loaded: .*libopengl0"):
+        meshlab.close_holes(V, F, 5)
+
+
+def test_a_reader_left_out_for_want_of_opengl_names_the_package(refuse):
+    refuse("Unknown format for load: ply")
+    with pytest.raises(MissingDependencyError, match=r"cannot read a\.ply: .*libopengl0"):
+        meshlab.read_mesh("a.ply")
+
+
+def test_a_filter_that_fails_is_told_in_one_line(refuse):
+    refuse("Failed to apply filter: taubin\nDetails: too\n  few faces")
+    with pytest.raises(BackendError, match=r"failed: .*Details: too few faces"):
+        meshlab.taubin(V, F, 2)
+
+
+def test_an_absent_pymeshlab_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    with pytest.raises(MissingDependencyError, match="pip install pymeshlab"):
+        meshlab.taubin(V, F, 2)

@@ -362,7 +362,8 @@ def _colour_bar(
     colormaps = require("matplotlib").colormaps
     norm = require("matplotlib.colors").Normalize(*limits)
     mappable = require("matplotlib.cm").ScalarMappable(norm, colormaps[colours].resampled(bands))
-    figure.colorbar(mappable, ax=list(axes), label=label, shrink=0.8, aspect=30)
+    bar = figure.colorbar(mappable, ax=list(axes), label=label, shrink=0.8, aspect=30)
+    bar.ax.ticklabel_format(axis="y", useOffset=False)
 
 
 def colour_limits(*values: Floats) -> Limits:
@@ -370,6 +371,20 @@ def colour_limits(*values: Floats) -> Limits:
     low, high = np.percentile(np.concatenate([np.ravel(v) for v in values]), [1, 99])
     room = 1e-6 * max(abs(low), abs(high), 1e-6)
     return (float(low), float(high)) if high - low > room else (float(low), float(low + 2 * room))
+
+
+def ratio_limits(ratios: Floats, least: float = 0.02) -> Limits:
+    """Return limits as far below 1 as above: the 99th percentile of |ratio - 1|, or `least`.
+
+    So 1 takes the middle colour, and changes too small to matter stay pale.
+
+    Examples
+    --------
+    >>> ratio_limits(np.array([1.0001, 0.9999]))
+    (0.98, 1.02)
+    """
+    room = max(float(np.percentile(np.abs(np.ravel(ratios) - 1), 99)), least)
+    return 1 - room, 1 + room
 
 
 def extents(points: Floats) -> str:
@@ -535,7 +550,7 @@ def draw_distribution(values: Floats, label: str) -> Figure:
     left, right = figure.subplots(1, 2)
     low, high = colour_limits(v)
     left.hist(np.clip(v, low, high), bins=60, color=TOP)
-    left.set(xlabel=f"{label} (1 % at each end in the outer bars)", ylabel="blocks")
+    left.set(xlabel=f"{label} (the outermost 1 % are in the end bars)", ylabel="blocks")
     ordered = np.sort(v)
     share = np.arange(1, len(v) + 1) / len(v)
     keep = np.unique(np.linspace(0, len(v) - 1, min(len(v), 2000)).astype(int))
@@ -543,10 +558,12 @@ def draw_distribution(values: Floats, label: str) -> Figure:
     quantiles = [0.5, 0.9, 0.95]
     at = np.quantile(v, quantiles)
     right.plot(at, quantiles, "o", color=BOTTOM)
-    notes = [f"{q:.0%} at or below {x:.4g}" for q, x in zip(quantiles, at, strict=True)]
+    notes = [f"{q:.0%} at or below {x:.5g}" for q, x in zip(quantiles, at, strict=True)]
     right.text(0.97, 0.06, "\n".join(notes), transform=right.transAxes, ha="right", fontsize=10)
     right.set(xlabel=label, ylabel="share of blocks", ylim=(0, 1.02))
     for ax in (left, right):
+        ax.ticklabel_format(axis="x", useOffset=False)
+        ax.locator_params(axis="x", nbins=6)
         ax.grid(alpha=0.3)
         ax.spines[["top", "right"]].set_visible(False)
     return figure

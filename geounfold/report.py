@@ -25,6 +25,7 @@ from geounfold.plotting import (
     draw_bodies,
     draw_distribution,
     png,
+    ratio_limits,
 )
 from geounfold.quality import NEIGHBOURS, epsilon, neighbours, nmd
 
@@ -33,12 +34,16 @@ if TYPE_CHECKING:
 
 _CARE = 0.001  # share of blocks outside the control mesh from which the verdict asks for care
 
+# Column: what its axis is called, and what it means.
 _DISTORTIONS = {
-    "nmd_error": "epsilon(X, Y): relative change of the neighbour mean distance",
-    "volume_ratio": "volume ratio, unfolded over folded",
-    "shear": "layer-parallel shear",
-    "stretch_max": "largest principal stretch",
-    "stretch_min": "smallest principal stretch",
+    "nmd_error": (
+        "epsilon(X, Y)",
+        "relative change of the neighbour mean distance, folded X to unfolded Y",
+    ),
+    "volume_ratio": ("volume ratio", "volume of the control tetrahedron, unfolded over folded"),
+    "shear": ("shear", "layer-parallel shear, the slip of layers over one another"),
+    "stretch_max": ("largest stretch", "largest principal stretch"),
+    "stretch_min": ("smallest stretch", "smallest principal stretch"),
 }
 _PICTURED = ("nmd_error", "volume_ratio", "shear")
 
@@ -62,7 +67,7 @@ summary { margin: 1.4rem 0 .6rem; font-size: 1.2rem; font-weight: bold; cursor: 
 .care { border-color: var(--care); } .care strong { color: var(--care); }
 .bad { border-color: var(--bad); } .bad strong { color: var(--bad); }
 .tiles { display: grid; gap: .7rem;
-  grid-template-columns: repeat(auto-fill, minmax(11.5rem, 1fr)); }
+  grid-template-columns: repeat(auto-fill, minmax(9.5rem, 1fr)); }
 .tile { background: var(--card); border: 1px solid var(--line); border-radius: .3rem;
   padding: .6rem .8rem; }
 .tile b { display: block; font-size: 1.25rem; font-variant-numeric: tabular-nums; }
@@ -73,7 +78,10 @@ figure img { display: block; width: 100%; height: auto; background: #ffffff;
 table { border-collapse: collapse; font-size: .9rem; }
 th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line);
   vertical-align: top; }
-th + th, td.number { text-align: right; font-variant-numeric: tabular-nums; }
+th.number, td.number { text-align: right; font-variant-numeric: tabular-nums; }
+td { overflow-wrap: anywhere; }
+.across td { overflow-wrap: normal; }
+@media (max-width: 44rem) { body { padding: 1rem; } .wide img { width: 44rem; } }
 pre { overflow-x: auto; background: var(--card); padding: .8rem; font-size: .8rem; }
 """
 
@@ -129,23 +137,45 @@ def report_html(
     X, Y = np.asarray(folded, dtype=np.float64), np.asarray(unfolded, dtype=np.float64)
     drawn = _checked(X, Y, columns)
     check_rendering()
-    title = f"Unfolding of {len(X):,} blocks"
+    summary = _without_folders(summary)
+    title = _text(_title(summary, len(X)))
+    options = _mapping(summary.get("options"))
     body = [
         f"<h1>{title}</h1>",
-        f'<p class="soft">geounfold {_text(summary.get("version", ""))}</p>',
+        f'<p class="soft">{len(X):,} blocks, geounfold {_text(summary.get("version", ""))}</p>',
         _verdict_html(verdict(summary)),
         _tiles(summary),
-        _section("Warnings", _list(summary.get("warnings", []))),
+        "<h2>Warnings</h2>",
+        _list(summary.get("warnings", [])) or "<p>None.</p>",
         "<h2>Before and after</h2>",
         *_pictures(X, Y, drawn, view),
-        "<h2>Distributions</h2>",
+        "<h2>Distributions over the blocks</h2>",
         *_distributions(drawn),
-        _section("Surfaces", _surfaces(summary)),
-        _section("Seconds", _table([_flat(summary.get("seconds", {}))])),
-        _folded_up("Options", _pairs(_flat(summary.get("options", {})))),
+        _section("How it was made", _pairs(_making(summary))),
+        _section("Flattened surfaces", _surfaces(summary)),
+        _section("Seconds per stage", _table([_flat(summary.get("seconds", {}))])),
+        _section("Options", _pairs({k: v for k, v in options.items() if not _mapping(v)})),
+        _folded_up(
+            "Options of the stages",
+            _pairs(_flat({k: v for k, v in options.items() if _mapping(v)})),
+        ),
         _folded_up("Everything, as JSON", f"<pre>{_text(_json(summary))}</pre>"),
     ]
     return _PAGE.format(title=title, style=_STYLE, body="\n".join(body))
+
+
+def _without_folders(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the summary with files named without their folders, fit to be passed on."""
+    out = dict(summary)
+    for key in ("input", "samples"):
+        facts = _mapping(out.get(key))
+        if "file" in facts:
+            out[key] = {**facts, "file": Path(str(facts["file"])).name}
+    return out
+
+
+def _title(summary: Mapping[str, Any], count: int) -> str:
+    return f"Unfolding of {_mapping(summary.get('input')).get('file') or f'{count:,} blocks'}"
 
 
 _PAGE = """<!doctype html>
@@ -214,7 +244,7 @@ def verdict(summary: Mapping[str, Any]) -> Verdict:
     inverted = [summary.get("inverted_folded"), summary.get("inverted_unfolded")]
     outside, proved = summary.get("outside_share"), summary.get("injective")
     reasons = tuple(_reasons(summary))
-    level, headline = "care", "Nothing is inverted, but that the map is one to one is not proved."
+    level, headline = "care", "Usable: nothing is inverted. That it is one to one is not proved."
     if any(inverted):
         level, headline = "bad", "The map folds over itself: do not use it as it is."
     elif None in inverted:
@@ -275,22 +305,26 @@ def _pictures(
         yield _figure(figure, f"Mean distance to the {NEIGHBOURS} neighbours of the folded body.")
     for name in _PICTURED:
         if name in drawn:
-            figure = draw_bodies(X, Y, drawn[name], name, colours="cividis", options=view)
-            yield _figure(figure, f"{name}: {_DISTORTIONS[name]}.")
+            label, meaning = _DISTORTIONS[name]
+            look: dict[str, Any] = {"colours": "cividis", "options": view}
+            if name == "volume_ratio":
+                look |= {"colours": "RdYlBu_r", "limits": ratio_limits(drawn[name])}
+            figure = draw_bodies(X, Y, drawn[name], label, **look)
+            yield _figure(figure, f"{name}: {meaning}.")
 
 
 def _distributions(drawn: Mapping[str, Floats]) -> Iterable[str]:
-    for name, meaning in _DISTORTIONS.items():
+    for name, (label, meaning) in _DISTORTIONS.items():
         if name in drawn:
             caption = f"{name}: {meaning}. Histogram and cumulative share."
-            yield _figure(draw_distribution(drawn[name], name), caption)
+            yield _figure(draw_distribution(drawn[name], label), caption)
 
 
 def _figure(figure: Figure, caption: str) -> str:
     data = base64.b64encode(png(figure)).decode("ascii")
     text = _text(caption)
     return (
-        f'<figure><img alt="{text}" src="data:image/png;base64,{data}">'
+        f'<figure><div class="wide"><img alt="{text}" src="data:image/png;base64,{data}"></div>'
         f"<figcaption>{text}</figcaption></figure>"
     )
 
@@ -357,15 +391,48 @@ def _table(rows: list[dict[str, Any]]) -> str:
     names = list(dict.fromkeys(name for row in rows for name in row))
     if not names:
         return ""
-    head = "".join(f"<th>{_text(name)}</th>" for name in names)
+    kinds = [' class="number"' if all(map(_is_number, _column(rows, n))) else "" for n in names]
+    head = "".join(f"<th{k}>{_text(n)}</th>" for n, k in zip(names, kinds, strict=True))
     lines = []
     for row in rows:
         cells = (
-            f'<td class="number">{_text(_number(row[name]) if name in row else "")}</td>'
-            for name in names
+            f"<td{kind}>{_text(_number(row[name]) if name in row else '')}</td>"
+            for name, kind in zip(names, kinds, strict=True)
         )
         lines.append(f"<tr>{''.join(cells)}</tr>")
-    return f'<div class="wide"><table><tr>{head}</tr>{"".join(lines)}</table></div>'
+    return f'<div class="wide across"><table><tr>{head}</tr>{"".join(lines)}</table></div>'
+
+
+def _column(rows: list[dict[str, Any]], name: str) -> list[Any]:
+    return [row[name] for row in rows if name in row]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | list)
+
+
+_MADE = {
+    "lattice.steps": "sides of the blocks",
+    "lattice.spacing": "working unit",
+    "bodies": "bodies",
+    "hull.method": "hull",
+    "hull.reason": "why this hull",
+    "hull.volume": "volume of the hull",
+    "hull.blocks_volume": "volume of the blocks",
+    "control_mesh.vertices": "vertices of the control mesh",
+    "control_mesh.tetrahedra": "tetrahedra of the control mesh",
+    "control_mesh.volume_folded": "its volume, folded",
+    "control_mesh.volume_unfolded": "its volume, unfolded",
+    "certificate.unchecked": "not checked",
+}
+
+
+def _making(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is known of the stages, by plain names; lengths in the input's unit."""
+    known = _flat(summary)
+    out = {label: known[key] for key, label in _MADE.items() if known.get(key) is not None}
+    out.update({k.replace("_", " "): v for k, v in _mapping(summary.get("method")).items()})
+    return out
 
 
 def _surfaces(summary: Mapping[str, Any]) -> str:
@@ -389,12 +456,10 @@ _TILES: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("outside_share", "blocks outside", lambda v: f"{v:.3%}"),
     ("round_trip_max", "round trip, largest", _number),
     ("nmd.mean", "epsilon(X, Y), mean", _number),
-    ("nmd.p95", "epsilon(X, Y), 95 %", _number),
-    ("volume_change.mean", "|volume ratio - 1|, mean", _number),
-    ("edge_change.mean", "|edge change|, mean", _number),
+    ("nmd.p95", "epsilon(X, Y), 95\u00a0%", _number),
+    ("volume_change.mean", "volume change, mean", _number),
+    ("edge_change.mean", "edge change, mean", _number),
     ("shear.max", "shear, largest", _number),
-    ("hull.faces", "faces of the hull", _number),
-    ("control_mesh.tetrahedra", "control tetrahedra", _number),
     ("peak_memory_mb", "peak memory, MiB", lambda v: f"{v:,.0f}"),
 )
 

@@ -17,6 +17,7 @@ from geounfold.plotting import (
     block_sides,
     check_rendering,
     draw_bodies,
+    draw_body,
     draw_control,
     draw_curves,
     draw_distribution,
@@ -100,6 +101,7 @@ def test_bodies_are_drawn_side_by_side():
     assert is_png(png(draw_bodies(SLAB, SLAB * [1, 1, 0.5], SLAB[:, 2], "height", options=SMALL)))
     pair = (SLAB[:, 0], SLAB[:, 1] * 0 + 2.0)
     assert is_png(png(draw_bodies(SLAB, SLAB, pair, "x", options=SMALL)))
+    assert is_png(png(draw_body(SLAB, SLAB[:, 2], "height", options=SMALL)))
 
 
 @needs_rendering

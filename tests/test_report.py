@@ -33,6 +33,8 @@ SUMMARY = SOUND | {
     "nmd": {"mean": 0.0123, "std": 0.01, "p95": 0.04, "max": 0.3},
     "top": {"faces": 10, "area": 5.0},
     "flattening": {"top": {"stop": "converged", "iterations": 7, "flips": 0}},
+    "hull": {"method": "density", "reason": "closed, manifold"},
+    "input": {"file": "/home/someone/secret/blocks.csv", "rows": 120},
     "warnings": ["3 points <b>repeat</b> others"],
 }
 
@@ -76,6 +78,9 @@ def test_the_page_is_whole_and_loads_nothing(tmp_path):
         assert head == "data:image/png;base64"
         assert base64.b64decode(data, validate=True).startswith(b"\x89PNG")
     assert not re.search(r"https?://|url\(|@import|<script", text)
+    assert "secret" not in text  # folders stay private
+    assert "Unfolding of blocks.csv" in words
+    assert "why this hull" in words
     for expected in ("120 blocks", "9.8.7", "hull.sigma", "0.8", "converged", "Sound", "1.23%"):
         assert expected in words
     assert "3 points <b>repeat</b> others" in words  # escaped: read as text, not as a tag
@@ -85,7 +90,10 @@ def test_the_page_is_whole_and_loads_nothing(tmp_path):
 def test_a_summary_without_anything_still_gives_a_page():
     page = Page(report_html({}, SLAB[:8], SLAB[:8], {}, view=SMALL))
     assert not page.images  # nothing to colour by, too few blocks for 26 neighbours
-    assert "It is not known whether the map folds over itself." in " ".join(page.words)
+    words = " ".join(page.words)
+    assert "It is not known whether the map folds over itself." in words
+    assert "Unfolding of 8 blocks" in words
+    assert "None." in words  # warnings
 
 
 @pytest.mark.parametrize(

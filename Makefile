@@ -44,11 +44,16 @@ test: $(STAMP)  ## run the tests and the docstrings' examples
 test-all: $(STAMP)  ## the same with the slow tests
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-check: $(STAMP)  ## formatting, lint, types and the direction of imports
+check: $(STAMP)  ## formatting, lint, types, direction of imports, notebooks like their scripts
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@for script in notebooks/*.py; do \
+	    $(BIN)/jupytext --quiet --to py:percent --output - "$${script%.py}.ipynb" | \
+	    diff --unified "$$script" - || \
+	    { echo "$$script and its notebook differ: run make notebooks" >&2; exit 1; }; \
+	done
 
 format: $(STAMP)  ## put the code into the standard format
 	$(BIN)/ruff format .
@@ -57,9 +62,9 @@ format: $(STAMP)  ## put the code into the standard format
 bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 
-notebooks: $(STAMP)  ## bring scripts and notebooks together, then run each notebook whole
-	$(BIN)/jupytext --sync notebooks/*.py
-	$(BIN)/python -m pytest --nbmake notebooks $(PYTEST_ARGS)
+notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each whole
+	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py
+	$(BIN)/python -m pytest --nbmake notebooks/*.ipynb $(PYTEST_ARGS)
 
 accept: $(STAMP)  ## score the acceptance bodies, where they are present
 	@if [ -f $(ACCEPTANCE)/score.py ]; then $(BIN)/python $(ACCEPTANCE)/score.py; \

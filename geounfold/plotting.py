@@ -464,6 +464,54 @@ def _polydata(mesh: TriMesh) -> Any:
     return require("pyvista").PolyData(V - V.mean(axis=0), faces)
 
 
+def draw_surface(
+    folded: TriMesh,
+    unfolded: TriMesh,
+    values: Floats,
+    label: str,
+    *,
+    limits: Limits | None = None,
+    colours: str = "viridis",
+    options: ViewOptions | None = None,
+) -> Figure:
+    """Draw a surface folded and unfolded, side by side, in the same colours.
+
+    Parameters
+    ----------
+    folded, unfolded : TriMesh
+        The same faces in both spaces.
+    values : (n,) or (m,) float
+        What to colour by, per vertex or per face.
+    label, limits, colours, options
+        See `draw_bodies`.
+
+    Raises
+    ------
+    InputError
+        As many values as there are neither vertices nor faces.
+    MissingDependencyError
+        Nothing can be drawn here; the message says what to install.
+    """
+    options = options or ViewOptions()
+    v = np.asarray(values, dtype=np.float64)
+    if v.shape not in ((len(folded.V),), (len(folded.F),)):
+        raise InputError(
+            f"{len(folded.V)} vertices or {len(folded.F)} faces need as many values, "
+            f"but there are {v.shape}"
+        )
+    limits = limits or colour_limits(v)
+    figure = _figure(12.5, 12.5 * 0.46 * options.size[1] / options.size[0] + 0.3)
+    axes = figure.subplots(1, 2)
+    look = {"scalars": "value", "clim": list(limits), "cmap": colours}
+    for ax, mesh, space in zip(axes, (folded, unfolded), ("folded", "unfolded"), strict=True):
+        surface = _polydata(mesh)
+        data = surface.point_data if len(v) == len(mesh.V) else surface.cell_data
+        data["value"] = v
+        _show(ax, _render(surface, options, **_LIT, **look), f"{space}: {extents(mesh.V)}")
+    _colour_bar(figure, list(axes), limits, colours, 256, label)
+    return figure
+
+
 def draw_split(
     mesh: TriMesh, side: Ints, rim: Bools, *, options: ViewOptions | None = None
 ) -> Figure:

@@ -22,6 +22,7 @@ from geounfold.plotting import (
     draw_curves,
     draw_distribution,
     draw_split,
+    draw_surface,
     png,
     render_body,
 )
@@ -105,6 +106,14 @@ def test_bodies_are_drawn_side_by_side():
 
 
 @needs_rendering
+def test_surfaces_are_coloured_by_vertex_or_by_face():
+    folded = TriMesh(CUBE, [[0, 1, 2], [1, 3, 2]])
+    flat = TriMesh(CUBE * [1, 1, 0.5], folded.F)
+    assert is_png(png(draw_surface(folded, flat, CUBE[:, 2], "height", options=SMALL)))
+    assert is_png(png(draw_surface(folded, flat, np.arange(2.0), "face", options=SMALL)))
+
+
+@needs_rendering
 def test_split_and_control_mesh_are_drawn():
     F = plotting._tet_faces(SIX)
     assert len(F) == 12
@@ -138,6 +147,10 @@ def test_distributions_and_curves_need_no_rendering():
         (lambda: render_body(SLAB, SLAB[1:, 0], (0, 1)), "192 points need as many values"),
         (lambda: render_body(SLAB, np.full(192, np.nan), (0, 1)), "192 values are not finite"),
         (lambda: render_body(SLAB, SLAB[:, 0], (1, 1)), "limits must rise"),
+        (
+            lambda: draw_surface(*[TriMesh(CUBE, [[0, 1, 2]])] * 2, np.ones(3), "x"),
+            "8 vertices or 1 faces need as many values",
+        ),
         (lambda: draw_split(TriMesh(CUBE, [[0, 1, 2]]), np.ones(2), np.ones(1)), "1 faces"),
         (lambda: draw_distribution(np.array([np.inf]), "x"), "x: needs finite values"),
     ],

@@ -79,6 +79,8 @@ def unfold(args: Namespace, console: Console) -> None:
             write_report(parts["--report"], summary, table.points, result.points, columns)
     for warning in summary.get("warnings", []):
         console.warn(str(warning))
+    if carried is not None:
+        _warn_of_outside(args.samples, carried, console)
     console.done(f"{len(table)} points unfolded into {args.output}")
 
 
@@ -90,7 +92,7 @@ def carry(args: Namespace, console: Console) -> None:
         overwrite=args.overwrite,
     )
     existing_file(Path(args.map))
-    table = _read(args.points, args, console)
+    table = _read(args.points, args, console, prefer=(_UNFOLDED,) if args.inverse else ())
     from geounfold import mapping
 
     saved = mapping.load(args.map)
@@ -102,7 +104,18 @@ def carry(args: Namespace, console: Console) -> None:
         columns = _columns(_UNFOLDED, saved.carry(table.points))
     with outputs.writing() as parts:
         table.write(parts["--output"], columns)
+    _warn_of_outside(args.points, columns, console)
     console.done(f"{len(table)} points carried into {args.output}")
+
+
+def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:
+    """Say how many carried points the control mesh does not hold."""
+    outside = int(np.count_nonzero(columns["location"] == "extrapolated"))
+    if outside:
+        console.warn(
+            f"{path}: {outside} of {len(columns['location'])} points lie outside the control mesh "
+            "and were carried by its nearest element; they are marked extrapolated"
+        )
 
 
 def compare(args: Namespace, console: Console) -> None:
@@ -266,11 +279,13 @@ def _triple(text: str | None) -> Triple | None:
     return None if text is None else parse_columns(text)
 
 
-def _read(path: str, args: Namespace, console: Console) -> PointTable:
+def _read(
+    path: str, args: Namespace, console: Console, prefer: tuple[Triple, ...] = ()
+) -> PointTable:
     """Read the points of a command, and say what was left out."""
     console.stage(f"reading {path}")
     columns = _triple(args.columns)
-    table = read_points(path, columns, drop_invalid=args.drop_invalid)
+    table = read_points(path, columns, prefer=prefer, drop_invalid=args.drop_invalid)
     if len(table.dropped):
         console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
     return table

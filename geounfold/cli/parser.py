@@ -32,7 +32,7 @@ in its place. Output tables are separated by commas, whatever the input's separa
 _MAP = (
     _RESULTS
     + """\
-with --inverse:
+with --inverse (columns unfolded_x/y/z are taken first where they exist):
   folded_x, folded_y, folded_z         coordinates with the folds put back
   location           as above
 

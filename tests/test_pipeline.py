@@ -194,7 +194,9 @@ def test_inverted_tetrahedra_are_an_error_unless_allowed(swelling, monkeypatch):
     def spoiled(control, *rest):
         V = np.array(control.unfolded.V)
         V[:, 2] *= -1
-        return type(control)(control.folded, control.unfolded.with_vertices(V), control.stratigraphic)
+        return type(control)(
+            control.folded, control.unfolded.with_vertices(V), control.stratigraphic
+        )
 
     monkeypatch.setattr(fitting, "with_datum", spoiled)
     with pytest.raises(ControlMeshError, match="are inverted .* around"):

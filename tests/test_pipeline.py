@@ -157,7 +157,7 @@ def test_duplicates_are_kept_and_counted(swelling):
 
 
 def test_several_bodies(swelling):
-    other = simulate("slab", blocks=3000).folded + [0.0, 2000.0, 0.0]
+    other = simulate("slab", blocks=3000).folded + np.array([0.0, 2000.0, 0.0])
     both = np.concatenate([swelling, other])
     with pytest.raises(InputError, match="2 separate bodies"):
         gu.unfold(both)
@@ -183,7 +183,7 @@ def test_reference_surfaces_in_place_of_a_hull():
     assert gu.aligned_rms(u.points, body.truth) < 0.15 * u.frame.scale
     with pytest.raises(InputError, match="both or neither"):
         gu.unfold(body.folded, top=top)
-    far = top.with_vertices(top.V + [1e5, 0.0, 0.0])
+    far = top.with_vertices(top.V + np.array([1e5, 0.0, 0.0]))
     with pytest.raises(InputError, match="face each other"):
         gu.unfold(body.folded, top=far, bottom=bottom)
 
@@ -199,7 +199,7 @@ def test_inverted_tetrahedra_are_an_error_unless_allowed(swelling, monkeypatch):
         )
 
     monkeypatch.setattr(fitting, "with_datum", spoiled)
-    with pytest.raises(ControlMeshError, match="are inverted .* around"):
+    with pytest.raises(ControlMeshError, match=r"are inverted .* around"):
         gu.unfold(swelling)
     u = gu.unfold(swelling, allow_uncertified=True)
     assert u.control.inverted_unfolded > 0

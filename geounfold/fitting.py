@@ -10,7 +10,7 @@ import numpy as np
 
 from geounfold.control import ControlMesh
 from geounfold.errors import ControlMeshError
-from geounfold.flattening import FLATTENERS, Flattening, flatten
+from geounfold.flattening import Flattening, flatten
 from geounfold.frame import Frame
 from geounfold.geometry import face_normals, tet_volumes, triangle_areas
 from geounfold.hull import Hull, extract_hull
@@ -120,15 +120,11 @@ def fit(
     return result
 
 
-def _flattener(
-    options: UnfoldOptions,
-) -> Callable[[TriMesh, Floats | None, Floats | None], Flattening]:
-    """Return the chosen flattener; arc lengths reach it where it works on lengths."""
-    intrinsic = FLATTENERS[options.flattener].intrinsic
+def _flattener(options: UnfoldOptions) -> Callable[[TriMesh, Floats | None], Flattening]:
+    """Return the chosen flattener; a start is passed on where the method uses one."""
 
-    def run(mesh: TriMesh, start: Floats | None, rest: Floats | None) -> Flattening:
-        usable = rest if intrinsic else None
-        return flatten(mesh, options.flattener, start=start, rest=usable)
+    def run(mesh: TriMesh, start: Floats | None) -> Flattening:
+        return flatten(mesh, options.flattener, start=start)
 
     return run
 
@@ -146,7 +142,14 @@ def _fit_sheet(
     inset = 0.0 if hull is None else hull.inset
     with stage("sheet"):
         result = fit_body(
-            parts, points, variance, inset, _flattener(options), options.sheet_options, datum
+            parts,
+            points,
+            frame.steps,
+            variance,
+            inset,
+            _flattener(options),
+            options.sheet_options,
+            datum,
         )
     mesh = result.mesh
     surfaces = {
@@ -159,6 +162,7 @@ def _fit_sheet(
         "roughness": result.fitted.roughness,
         "smoothing": result.fitted.smoothing,
         "accepted_samples": result.fitted.accepted,
+        "sharpened": result.sharpened,
     }
     return BodyFit(hull, parts, mesh.control, surfaces, mesh.flattenings, result, notes)
 

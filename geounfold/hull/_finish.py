@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -107,6 +107,12 @@ def finish(
         blur=blur,
         dropped=int((~keep).sum()),
     )
+
+
+def smoothed(hull: Hull, steps: int) -> Hull:
+    """Return a hull whose vertices are smoothed by Taubin's steps, which keep the volume."""
+    V = meshlab.taubin(hull.mesh.V, hull.mesh.F, steps)
+    return replace(hull, mesh=hull.mesh.with_vertices(V), volume=enclosed_volume(V, hull.mesh.F))
 
 
 def largest_component(F: Ints) -> Bools:

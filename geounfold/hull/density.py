@@ -23,8 +23,8 @@ from scipy.special import ndtri
 
 from geounfold.backends import igl as _igl
 from geounfold.geometry import unit
-from geounfold.hull._finish import HullOptions, finish
-from geounfold.hull._result import Hull
+from geounfold.hull._finish import HullOptions, finish, smoothed
+from geounfold.hull._result import UNEQUAL, Hull
 from geounfold.mesh import Floats, Ints
 
 BRICK = 16  # grid nodes per brick and axis, at half a block
@@ -146,7 +146,8 @@ def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     """
     field = density_field(points / sides, options.sigma)
     V, F = field.level_set(options.level)
-    return finish(
+    flat = sides.max() > UNEQUAL * sides.min()
+    hull = finish(
         V * sides,
         F,
         method="density",
@@ -156,6 +157,9 @@ def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
         options=options,
         project=lambda x: field.project(x / sides, options.level) * sides,
     )
+    # Flat blocks climb a slope in stairs wider than the blur: unsmoothed, they pass for rims
+    # (rms 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
+    return smoothed(hull, options.smoothing) if flat else hull
 
 
 def density_field(points: Floats, sigma: float = 0.8) -> DensityField:

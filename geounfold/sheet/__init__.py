@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
 from geounfold.sheet.fit import FitOptions, FittedSheet, Samples, fit_sheet
 from geounfold.sheet.horizons import HorizonOptions, Horizons, fit_horizons
+from geounfold.sheet.layered import LayerOptions, sharpen_layers
 from geounfold.sheet.medial import MedialOptions, MedialSheet, medial_sheet
+from geounfold.sheet.occupancy import OccupancyOptions, sharpen
+from geounfold.sheet.sites import surface_sites
 from geounfold.split import SurfaceSplit
 
 __all__ = [
@@ -18,8 +23,10 @@ __all__ = [
     "Flatten",
     "HorizonOptions",
     "Horizons",
+    "LayerOptions",
     "MedialOptions",
     "MedialSheet",
+    "OccupancyOptions",
     "Samples",
     "SheetMesh",
     "SheetOptions",
@@ -30,27 +37,36 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """Options of every stage of the sheet method; lengths in blocks."""
+    """Options of every stage of the sheet method; lengths in blocks.
+
+    ``refused_rough``: the fit's ``rough`` where lattice sites do not agree with a smooth sheet.
+    """
 
     medial: MedialOptions = field(default_factory=MedialOptions)
     fit: FitOptions = field(default_factory=FitOptions)
+    occupancy: OccupancyOptions = field(default_factory=OccupancyOptions)
     horizons: HorizonOptions = field(default_factory=HorizonOptions)
+    layers: LayerOptions = field(default_factory=LayerOptions)
     control: ControlOptions = field(default_factory=ControlOptions)
+    refused_rough: float = 1.25
 
 
 @dataclass(frozen=True, eq=False)
 class SheetResult:
-    """Every stage of the sheet method, in working units."""
+    """Every stage of the sheet method, in working units; ``sharpened``: by lattice
+    ``sites``, by ``layers``, or by nothing (empty)."""
 
     medial: MedialSheet
     fitted: FittedSheet
     horizons: Horizons
     mesh: SheetMesh
+    sharpened: str
 
 
 def fit_body(
     split: SurfaceSplit,
     points: Floats,
+    steps: Floats | None,
     variance: Floats,
     inset: float,
     flatten: Flatten,
@@ -65,6 +81,8 @@ def fit_body(
         The hull's (or the reference surfaces') faces as top, bottom, rim; working units.
     points : (n, 3) float
         Blocks, working units.
+    steps : (3,) float or None
+        Block sides, where the blocks lie on a lattice at whole multiples of them.
     variance : (3,) float
         Variance of the blur the hull was made with, per axis; zeros for none.
     inset : float
@@ -83,11 +101,35 @@ def fit_body(
     """
 
     def parameters(mesh: TriMesh, start: Floats | None) -> Floats:
-        return flatten(mesh, start, None).uv
+        return flatten(mesh, start).uv
 
     medial = medial_sheet(split, parameters, options.medial)
     samples = Samples(split.mesh.V, medial.normals, variance, inset)
-    fitted = fit_sheet(medial, samples, points, options.fit)
+    fitted, sharpened = _fitted(medial, samples, points, steps, options)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
-    return SheetResult(medial, fitted, horizons, mesh)
+    return SheetResult(medial, fitted, horizons, mesh, sharpened)
+
+
+def _fitted(
+    medial: MedialSheet,
+    samples: Samples,
+    points: Floats,
+    steps: Floats | None,
+    options: SheetOptions,
+) -> tuple[FittedSheet, str]:
+    """Return the fitted sheet, and what sharpened it (see SheetResult).
+
+    Sites that no smooth sheet explains belong to a rougher body: it is fitted again, less
+    smoothly.
+    """
+    fitted = fit_sheet(medial, samples, points, options.fit)
+    if steps is None:
+        layered = sharpen_layers(fitted, points, options.layers)
+        return (fitted, "") if layered is None else (layered, "layers")
+    cells = np.rint(points / steps).astype(np.int64)
+    sharper = sharpen(fitted, surface_sites(cells, steps), options.occupancy)
+    if sharper is not None:
+        return sharper, "sites"
+    rougher = replace(options.fit, rough=options.refused_rough)
+    return fit_sheet(medial, samples, points, rougher), ""

@@ -10,7 +10,6 @@ import numpy as np
 from geounfold.backends.igl import TetIndex
 from geounfold.control import ControlMesh, Datum
 from geounfold.flattening._result import Flattening
-from geounfold.geometry import lengths, unique_edges
 from geounfold.mesh import Floats, Ints, TetMesh, TriMesh
 from geounfold.sheet.fit import FittedSheet
 from geounfold.sheet.footprint import Footprint, footprint, principal_direction
@@ -18,8 +17,8 @@ from geounfold.sheet.horizons import Horizons
 from geounfold.sheet.layers import Layers, bad_nodes, neighbour_mean, shrink
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
-Flatten = Callable[[TriMesh, Floats | None, Floats | None], Flattening]
-"""``flatten(mesh, start, rest)``; ``rest`` are the lengths of ``unique_edges(F)``."""
+Flatten = Callable[[TriMesh, Floats | None], Flattening]
+"""``flatten(mesh, start)``: a surface laid flat from a start, (n, 2) or None."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,19 +72,6 @@ class SheetMesh:
     surfaces: dict[str, tuple[TriMesh, TriMesh]]
 
 
-def arc_lengths(V: Floats, normal: Floats, F: Ints) -> Floats:
-    """Return the lengths of the edges measured along arcs that meet the normals, (k,).
-
-    A chord under an arc of half-angle a is sin(a)/a of it; 2 a is the angle between the
-    normals (n, 3) at its ends.
-    """
-    E = unique_edges(F)
-    half = np.arcsin(np.clip(np.linalg.norm(normal[E[:, 0]] - normal[E[:, 1]], axis=1) / 2, 0, 1))
-    stretch = np.divide(half, np.sin(half), out=np.ones_like(half), where=half > 1e-9)
-    out: Floats = lengths(V, E) * stretch
-    return out
-
-
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
     """Return A (n, 2) moved rigidly, never mirrored, onto B (n, 2) by weighted least squares."""
     w = weight / weight.sum()
@@ -108,11 +94,38 @@ def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
 
 
 @dataclass(frozen=True, eq=False)
+class _Nodes:
+    """Places of the control mesh's nodes on the normals of the mid surface, (n, 3) each.
+
+    A mesh whose nodes lie on a curved surface is shorter than it, and lies on its inner side.
+    Nodes lifted by 1/24 of the second difference over a cell have chords as long as the arcs;
+    lifted by 1/12, the flat cells have the arcs' mean height (Simpson's rule).  The points at
+    height t are ``P + t normal`` of either pair.
+    """
+
+    chord_P: Floats
+    chord_normal: Floats
+    mean_P: Floats
+    mean_normal: Floats
+
+
+def _lifted_nodes(sheet: Sheet, prints: Footprint) -> _Nodes:
+    """Return the nodes of both kinds at the footprint's parameters."""
+    jet = sheet.jet(prints.U)
+    P, normal = jet.value, normals(jet)
+    bend_P, bend_n = np.zeros_like(P), np.zeros_like(P)
+    for axis in prints.axes * prints.cell:
+        for step in (axis, -axis):
+            near = sheet.jet(prints.U + step)
+            bend_P += near.value - P
+            bend_n += normals(near) - normal
+    return _Nodes(P - bend_P / 24, normal - bend_n / 24, P - bend_P / 12, normal - bend_n / 12)
+
+
+@dataclass(frozen=True, eq=False)
 class _FlatSheet:
     """The mid surface at the footprint's nodes, flat, with slopes above and below."""
 
-    P: Floats
-    normal: Floats
     flat: Floats
     slopes: tuple[Floats, Floats]
     flattenings: dict[str, Flattening]
@@ -123,36 +136,31 @@ class _FlatSheet:
 
 
 def _flatten_sheet(
-    sheet: Sheet, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes, prints: Footprint, reach: tuple[float, float], flatten: Flatten
 ) -> _FlatSheet:
     """Flatten the mid surface and the parallel surfaces ``reach`` above and below it."""
-    jet = sheet.jet(prints.U)
-    P, normal = jet.value, normals(jet)
-
-    def flat(V: Floats, start: Floats) -> Flattening:
-        return flatten(TriMesh(V, prints.F), start, arc_lengths(V, normal, prints.F))
-
-    middle = flat(P, prints.U)
+    P, normal = nodes.chord_P, nodes.chord_normal
+    middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
-    above = flat(P + reach[0] * normal, mid)
-    below = flat(P - reach[1] * normal, mid)
+    above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid)
+    below = flatten(TriMesh(P - reach[1] * normal, prints.F), mid)
     slopes = tuple(
         (register(f.uv, mid, prints.weight) - mid) / q
         for f, q in zip((above, below), reach, strict=True)
     )
     flattenings = {"mid": middle, "top": above, "bottom": below}
-    return _FlatSheet(P, normal, mid, (slopes[0], slopes[1]), flattenings)
+    return _FlatSheet(mid, (slopes[0], slopes[1]), flattenings)
 
 
 def _safely_flat(
-    sheet: Sheet, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes, prints: Footprint, reach: tuple[float, float], flatten: Flatten
 ) -> _FlatSheet:
     """Flatten at the full reach, or nearer to the mid surface where that would fold over.
 
     Slip is linear in height on a developable sheet, so nearer surfaces give the same slopes.
     """
     for share in (1.0, 0.6, 0.35, 0.2):
-        result = _flatten_sheet(sheet, prints, (share * reach[0], share * reach[1]), flatten)
+        result = _flatten_sheet(nodes, prints, (share * reach[0], share * reach[1]), flatten)
         if not result.flips:
             break
     return result
@@ -248,12 +256,13 @@ def build_control(
     reach = float(np.abs(foot.t[use]).max()) + options.pad
     constant = not (caps < reach).any()
     safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
-    flat = _safely_flat(sheet, prints, (safe[0], safe[1]), flatten)
+    nodes = _lifted_nodes(sheet, prints)
+    flat = _safely_flat(nodes, prints, (safe[0], safe[1]), flatten)
     follow = _offsets(prints, foot, caps, options)
     offsets = np.full_like(follow, reach) if constant else follow
     layers = Layers(
-        flat.P,
-        flat.normal,
+        nodes.mean_P,
+        nodes.mean_normal,
         flat.flat,
         flat.slopes[0],
         flat.slopes[1],

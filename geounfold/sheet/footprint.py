@@ -29,6 +29,10 @@ class Footprint:
         Flat index of every node in the (shape + 1) node grid.
     shape : (int, int)
         Number of cells along each axis.
+    axes : (2, 2) float
+        Unit directions of the cells' sides, as rows.
+    cell : float
+        Side of the cells.
     """
 
     U: Floats
@@ -37,6 +41,8 @@ class Footprint:
     cell_of: Ints
     node: Ints
     shape: tuple[int, int]
+    axes: Floats
+    cell: float
 
     def at_nodes(self, cells: Floats, reach: int) -> Floats:
         """Return a cell field as a smooth upper bound at the nodes, (n,).
@@ -103,4 +109,5 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int) -> Footprint:
     capped = np.pad(np.minimum(count, np.median(count[held])).astype(float), 1)
     around = capped[:-1, :-1] + capped[1:, :-1] + capped[:-1, 1:] + capped[1:, 1:]
     weight = around.ravel()[node]
-    return Footprint(nodes, F.reshape(-1, 3), weight, at, node, (int(shape[0]), int(shape[1])))
+    extent = (int(shape[0]), int(shape[1]))
+    return Footprint(nodes, F.reshape(-1, 3), weight, at, node, extent, turn.T, cell)

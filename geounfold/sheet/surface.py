@@ -121,38 +121,40 @@ class FootSearch:
     index: SurfaceIndex
 
     def feet(self, Q: Floats, newton: int = 2) -> Foot:
-        """Return the feet of points Q (n, 3): nearest sample triangle, then Newton steps.
-
-        The Newton matrix is the first form less t times the second, the exact Hessian of
-        half the squared distance but for third derivatives; steps are clipped to one knot.
-        """
+        """Return the feet of points Q (n, 3): nearest sample triangle, then Newton steps."""
         _, face, closest = self.index.closest(Q)
         corners = self.F[face]
         weights = barycentric_in_triangles(closest, self.index.V, corners)
         U = np.einsum("ij,ijk->ik", weights, self.U[corners])
         for _ in range(newton):
-            U = U + self._step(Q, self.sheet.jet(U))
+            U = U + newton_step(self.sheet, Q, self.sheet.jet(U))
         P, Pu, Pv = self.sheet.grid.gradient(self.sheet.C, U)
         normal = unit(np.cross(Pu, Pv))
         t = np.einsum("ij,ij->i", Q - P, normal)
         miss = np.linalg.norm(Q - P - t[:, None] * normal, axis=1)
         return Foot(U, t, normal, miss)
 
-    def _step(self, Q: Floats, jet: Jet) -> Floats:
-        normal = normals(jet)
-        r = Q - jet.value
-        t = np.einsum("ij,ij->i", r, normal)
-        L, M, N = second_form(jet, normal)
-        E = np.einsum("ij,ij->i", jet.u, jet.u) - t * L
-        F = np.einsum("ij,ij->i", jet.u, jet.v) - t * M
-        G = np.einsum("ij,ij->i", jet.v, jet.v) - t * N
-        bu, bv = np.einsum("ij,ij->i", r, jet.u), np.einsum("ij,ij->i", r, jet.v)
-        det = E * G - F * F
-        good = det > 0.05  # past the focal surface the step would leave the foot
-        safe = np.where(good, det, 1.0)
-        step = np.stack([G * bu - F * bv, E * bv - F * bu], axis=1) / safe[:, None]
-        limit = self.sheet.grid.step
-        return np.where(good[:, None], np.clip(step, -limit, limit), 0.0)
+
+def newton_step(sheet: Sheet, Q: Floats, jet: Jet) -> Floats:
+    """Return the step (n, 2) in the parameters towards the feet of points Q (n, 3).
+
+    The Newton matrix is the first form less t times the second, the exact Hessian of half
+    the squared distance but for third derivatives; steps are clipped to one knot.
+    """
+    normal = normals(jet)
+    r = Q - jet.value
+    t = np.einsum("ij,ij->i", r, normal)
+    L, M, N = second_form(jet, normal)
+    E = np.einsum("ij,ij->i", jet.u, jet.u) - t * L
+    F = np.einsum("ij,ij->i", jet.u, jet.v) - t * M
+    G = np.einsum("ij,ij->i", jet.v, jet.v) - t * N
+    bu, bv = np.einsum("ij,ij->i", r, jet.u), np.einsum("ij,ij->i", r, jet.v)
+    det = E * G - F * F
+    good = det > 0.05  # past the focal surface the step would leave the foot
+    safe = np.where(good, det, 1.0)
+    step = np.stack([G * bu - F * bv, E * bv - F * bu], axis=1) / safe[:, None]
+    limit = sheet.grid.step
+    return np.where(good[:, None], np.clip(step, -limit, limit), 0.0)
 
 
 def blur_shift(jet: Jet, t: Floats, variance: Floats) -> Floats:

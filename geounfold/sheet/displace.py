@@ -1,0 +1,47 @@
+"""Moving a spline surface along its normals: bases, energies, feet that follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from geounfold.geometry import unit
+from geounfold.mesh import Floats
+from geounfold.sheet.surface import Foot, Sheet, newton_step, normals
+
+
+def node_normals(sheet: Sheet) -> Floats:
+    """Return the sheet's unit normals at its coefficients, inside the spline's range."""
+    grid = sheet.grid
+    ij = np.stack(np.unravel_index(np.arange(grid.size), grid.shape), axis=1)
+    ij = np.clip(ij, 1, np.array(grid.shape) - 2)
+    return normals(sheet.jet(grid.origin + grid.step * ij))
+
+
+def displacement_basis(sheet: Sheet, nodes: Floats, U: Floats, normal: Floats) -> sp.csr_array:
+    """Return the matrix (n, size) from displacements of the coefficients to heights at U.
+
+    Coefficients move along ``nodes`` (size, 3), their own normals; the height is measured
+    along ``normal`` (n, 3), the surface's at U (n, 2).
+    """
+    A = sheet.grid.basis(U)
+    along = np.einsum("nkd,nd->nk", nodes[A.indices.reshape(-1, 16)], normal)
+    A.data *= along.ravel()
+    return A
+
+
+def between_normals(energy: sp.csc_array, nodes: Floats) -> sp.csc_array:
+    """Return an energy of surfaces as one of normal displacements of their coefficients."""
+    E = energy.tocoo()
+    cos = np.einsum("ij,ij->i", nodes[E.row], nodes[E.col])
+    return sp.csc_array((E.data * cos, (E.row, E.col)), shape=E.shape)
+
+
+def follow_feet(sheet: Sheet, Q: Floats, U: Floats, steps: int) -> Foot:
+    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps alone."""
+    for _ in range(steps):
+        U = U + newton_step(sheet, Q, sheet.jet(U))
+    P, Pu, Pv = sheet.grid.gradient(sheet.C, U)
+    normal = unit(np.cross(Pu, Pv))
+    t = np.einsum("ij,ij->i", Q - P, normal)
+    return Foot(U, t, normal, np.linalg.norm(Q - P - t[:, None] * normal, axis=1))

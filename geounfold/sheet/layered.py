@@ -1,0 +1,161 @@
+"""Sharpen a fitted sheet by the layers that points gridded before folding lie in.
+
+Such points are no lattice, but in the sheet's coordinates they are: in m layers at heights
+(2 i + 1 - m) / m of the half thickness.  Every point then measures the mid surface, where a
+density hull is drawn outwards or inwards as folding spreads the points or packs them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from geounfold.mesh import Bools, Floats
+from geounfold.sheet.displace import (
+    between_normals,
+    displacement_basis,
+    follow_feet,
+    node_normals,
+)
+from geounfold.sheet.fit import FittedSheet
+from geounfold.sheet.spline import density_weights, spd_solver
+from geounfold.sheet.surface import slip_potential
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerOptions:
+    """How layers are found and fitted; lengths in blocks.
+
+    ``clear``: least mean cosine of the heights' phase for layers to be there; ``rounds``: fits
+    with feet found anew; ``smooth``: smoothing lengths tried by cross-validation;
+    ``smooth_half``: least one of the half thickness; ``most``: points used at most.
+    """
+
+    clear: float = 0.5
+    rounds: int = 4
+    smooth: tuple[float, ...] = (1.0, 1.6, 2.4, 3.2)
+    smooth_half: float = 2.0
+    most: int = 100_000
+
+
+def scatter(points: Floats) -> Floats:
+    """Return a number in [0, 1) per point (n,), even and unrelated to the rows' order."""
+    out: Floats = np.mod(points @ np.array([7.1317, 5.7731, 3.3119]), 1.0)
+    return out
+
+
+def layer_heights(t: Floats, half: Floats, clear: float) -> Floats | None:
+    """Return the height of each point's layer as a share of the half thickness, (n,).
+
+    None where the points are not in layers: for no number m of them is the mean of
+    ``-cos(pi m (t / half + 1))``, 1 for points in mid-layer, above ``clear``.
+
+    Examples
+    --------
+    >>> t = np.array([-2.0, 0.0, 2.0, 0.0])
+    >>> layer_heights(t, np.full(4, 3.0), 0.5).round(3).tolist()
+    [-0.667, 0.0, 0.667, 0.0]
+    """
+    q = t / half
+    counts = np.arange(1, int(2.5 * float(np.median(half))) + 2)
+    phase = [-float(np.cos(np.pi * m * (q + 1)).mean()) for m in counts]
+    if max(phase) < clear:
+        return None
+    m = counts[int(np.argmax(phase))]
+    layer = np.clip(np.round((q + 1) * m / 2 - 0.5), 0, m - 1)
+    out: Floats = (2 * layer + 1 - m) / m
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Heights ``r`` that a displacement z and a change of half thickness d should explain:
+    ``r = A z + diag(f) H d``, with the energies of both."""
+
+    r: Floats
+    A: sp.csr_array
+    H: sp.csr_array
+    bending: sp.csc_array
+    pull: Floats
+    half_energy: sp.csc_array
+    half_pull: Floats
+    knots: float
+    layers: int
+
+    def solve(self, smooth: float, smooth_half: float, use: Bools) -> tuple[Floats, Floats]:
+        """Return z, then d, fitted to some of the points."""
+        weight = len(use) / int(use.sum()) / self.layers
+        tiny = 1e-9 * sp.eye_array(self.A.shape[1])
+        stiff = (smooth / self.knots) ** 8
+        even = (max(smooth, smooth_half) / self.knots) ** 6
+        A, H, r = self.A[use], self.H[use], self.r[use]
+        K = weight * (A.T @ A) + stiff * self.bending + tiny
+        z = spd_solver(K)(weight * (A.T @ r) - stiff * self.pull)
+        r = r - A @ z
+        K = weight * (H.T @ H) + even * self.half_energy + tiny
+        d = spd_solver(K)(weight * (H.T @ r) - even * self.half_pull)
+        return z, d
+
+    def left(self, z: Floats, d: Floats, use: Bools) -> float:
+        """Return the mean square that z and d leave at some of the points."""
+        rest = self.r[use] - self.A[use] @ z - self.H[use] @ d
+        return float(np.mean(rest**2))
+
+
+def sharpen_layers(
+    fitted: FittedSheet, points: Floats, options: LayerOptions
+) -> FittedSheet | None:
+    """Return the sheet fitted through all layers of the points, or None where there are none.
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Fit to the hull.
+    points : (n, 3) float
+        Blocks, working units.
+    options : LayerOptions
+        See there.
+    """
+    sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
+    if len(points) > options.most:
+        points = points[scatter(points[:, ::-1]) < options.most / len(points)]
+    part = scatter(points) < 0.5
+    every = np.ones(len(points), dtype=bool)
+    U = sheet.search(fitted.near, reach=8.0).feet(points).U
+    rough, fine = grid.energy(4), grid.energy(3)
+    smooth = options.smooth[len(options.smooth) // 2]
+    for turn in range(options.rounds):
+        foot = follow_feet(sheet, points, U, steps=1)
+        U = foot.U
+        flat = U - foot.t[:, None] * grid.value(fitted.slip, U)
+        thickness = np.maximum(grid.value(half, flat), 0.2)
+        level = layer_heights(foot.t, thickness, options.clear)
+        if level is None:
+            return None
+        nodes = node_normals(sheet)
+        H = grid.basis(flat)
+        H.data *= np.repeat(level, 16)
+        problem = _Problem(
+            foot.t - H @ half,
+            displacement_basis(sheet, nodes, U, foot.normal),
+            H,
+            between_normals(rough, nodes),
+            np.einsum("ij,ij->i", nodes, rough @ sheet.C),
+            fine,
+            fine @ half,
+            grid.step,
+            len(np.unique(level)),
+        )
+        if turn == 1:
+            left = [
+                problem.left(*problem.solve(s, options.smooth_half, part), ~part)
+                for s in options.smooth
+            ]
+            smooth = options.smooth[int(np.argmin(left))]
+        z, d = problem.solve(smooth, options.smooth_half, every)
+        sheet, half = sheet.with_coefficients(sheet.C + nodes * z[:, None]), half + d
+        roughness = float(np.sqrt(problem.left(z, d, every)))
+    slip = slip_potential(sheet, U, density_weights(U, grid.step), grid.energy(2))
+    return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth, roughness=roughness)

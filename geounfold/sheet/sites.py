@@ -1,0 +1,58 @@
+"""Lattice sites at the body's surface: blocks on one side of it, empty places on the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from geounfold.mesh import Bools, Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """Blocks with an empty neighbour, and those empty neighbours.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Positions, working units.
+    occupied : (n,) bool
+        True for a block (the body's surface lies beyond it), False for an empty site.
+    """
+
+    points: Floats
+    occupied: Bools
+
+
+def surface_sites(cells: Ints, steps: Floats) -> Sites:
+    """Return the sites at the surface of the blocks, by their 26 neighbours.
+
+    Parameters
+    ----------
+    cells : (n, 3) int
+        Lattice cell of every block.
+    steps : (3,) float
+        Block sides, working units; cell k lies at ``k * steps``.
+    """
+    low = cells.min(axis=0) - 1
+    shape = cells.max(axis=0) - low + 2
+    stride = np.array([shape[1] * shape[2], shape[2], 1])
+    keys = np.unique((cells - low) @ stride)  # sorted: shifted keys are looked up in order
+    open_ = np.zeros(len(keys), dtype=bool)
+    empty = []
+    for offset in product((-1, 0, 1), repeat=3):
+        if not any(offset):
+            continue
+        wanted = keys + np.array(offset) @ stride
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        missing = keys[at] != wanted
+        open_ |= missing
+        empty.append(wanted[missing])
+    outside = np.unique(np.concatenate(empty))
+    every = np.concatenate([keys[open_], outside])
+    i, rest = np.divmod(every, stride[0])
+    j, k = np.divmod(rest, stride[1])
+    points = (np.stack([i, j, k], axis=1) + low) * steps
+    return Sites(points, np.arange(len(every)) < int(open_.sum()))

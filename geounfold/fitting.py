@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geounfold.control import ControlMesh
-from geounfold.errors import ControlMeshError
+from geounfold.errors import ControlMeshError, OptionError
 from geounfold.flattening import Flattening, flatten
 from geounfold.frame import Frame
 from geounfold.geometry import face_normals, tet_volumes, triangle_areas
@@ -19,6 +19,7 @@ from geounfold.options import UnfoldOptions
 from geounfold.reference import split_reference
 from geounfold.sheet import SheetResult, fit_body
 from geounfold.split import SurfaceSplit, split
+from geounfold.thesis import thesis_control
 
 Stage = Callable[[str], AbstractContextManager[None]]
 """``with stage("hull"):`` times a stage and shows its name."""
@@ -170,7 +171,40 @@ def _fit_sheet(
 def _fit_thesis(
     points: Floats, hull: Hull | None, parts: SurfaceSplit, options: UnfoldOptions, stage: Stage
 ) -> BodyFit:
-    raise NotImplementedError
+    """Fit by the thesis's method; both its sheets are flat, whatever the datum."""
+    if hull is None:
+        raise OptionError(
+            "--method thesis takes its surfaces from the hull; leave out --top and --bottom, "
+            "or use --method sheet"
+        )
+    chosen = replace(options.thesis_options, flattener=options.flattener)
+    with stage("thesis"):
+        up = mean_top_normal(parts)
+        mesh = thesis_control(points, hull.mesh, up, chosen, hull.inset)
+    sides = {"top": (mesh.top, mesh.top_flat, 0.5), "bottom": (mesh.bottom, mesh.bottom_flat, -0.5)}
+    surfaces = {
+        name: SurfacePair(folded, _level(folded, flat.uv, share * mesh.thickness), flat)
+        for name, (folded, flat, share) in sides.items()
+    }
+    flattenings = {name: flat for name, (_, flat, _) in sides.items()}
+    notes: dict[str, object] = {
+        name: getattr(mesh, name)
+        for name in ("thickness", "bottom_missed", "top_missed", "extended", "squeezed", "steep")
+    }
+    return BodyFit(hull, parts, mesh.control, surfaces, flattenings, None, notes)
+
+
+def _level(mesh: TriMesh, uv: Floats, z: float) -> TriMesh:
+    """Return a mesh laid flat at a height."""
+    return mesh.with_vertices(np.column_stack([uv, np.full(len(uv), z)]))
+
+
+def mean_top_normal(parts: SurfaceSplit) -> Floats:
+    """Return the area-weighted sum of the top's normals, (3,), working units."""
+    F = parts.mesh.F[parts.side > 0]
+    area = triangle_areas(parts.mesh.V, F)
+    out: Floats = (area[:, None] * face_normals(parts.mesh.V, F)).sum(axis=0)
+    return out
 
 
 def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
@@ -179,10 +213,7 @@ def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
     Decided once for the whole sheet by the area-weighted normals of its top; a sheet whose
     mean normal is square to up (within 3 degrees) keeps the top the split chose.
     """
-    mine = parts.side > 0
-    F = parts.mesh.F[mine]
-    area = triangle_areas(parts.mesh.V, F)
-    mean = (area[:, None] * face_normals(parts.mesh.V, F)).sum(axis=0)
+    mean = mean_top_normal(parts)
     return bool(mean @ up < -0.05 * float(np.linalg.norm(mean)))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from geounfold.geometry import vertex_sum
 from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
 from geounfold.sheet.fit import FitOptions, FittedSheet, Samples, fit_sheet
@@ -104,7 +105,8 @@ def fit_body(
         return flatten(mesh, start).uv
 
     medial = medial_sheet(split, parameters, options.medial)
-    samples = Samples(split.mesh.V, medial.normals, variance, inset)
+    side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
+    samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)
     fitted, sharpened = _fitted(medial, samples, points, steps, options)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)

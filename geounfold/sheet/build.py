@@ -273,7 +273,7 @@ def build_control(
     )
     layers, rung, shrinks = _climb(layers, follow, constant, points, options)
     slip = sheet.grid.value(fitted.slip, prints.U)
-    bottom, top = horizons.crossings(prints.U, slip)
+    bottom, top = horizons.crossings(prints.U, slip, limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
     flat_datum = Datum(datum, means[0], means[1])
 

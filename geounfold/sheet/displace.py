@@ -38,9 +38,12 @@ def between_normals(energy: sp.csc_array, nodes: Floats) -> sp.csc_array:
 
 
 def follow_feet(sheet: Sheet, Q: Floats, U: Floats, steps: int) -> Foot:
-    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps alone."""
+    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps alone.
+
+    Feet stay within the sheet's rectangle; a point without a foot there keeps a large miss.
+    """
     for _ in range(steps):
-        U = U + newton_step(sheet, Q, sheet.jet(U))
+        U = np.clip(U + newton_step(sheet, Q, sheet.jet(U)), sheet.low, sheet.high)
     P, Pu, Pv = sheet.grid.gradient(sheet.C, U)
     normal = unit(np.cross(Pu, Pv))
     t = np.einsum("ij,ij->i", Q - P, normal)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from geounfold.geometry import unit
-from geounfold.mesh import Bools, Floats
+from geounfold.mesh import Bools, Floats, Ints
 from geounfold.sheet.medial import MedialSheet
 from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
 from geounfold.sheet.surface import Foot, Sheet, blur_shift, near_any, slip_potential
@@ -53,6 +53,8 @@ class Samples:
     ----------
     points, normals : (n, 3) float
         Hull vertices, working units, and their unit outward normals.
+    side : (n,) int
+        The split's side of each: +1 top, -1 bottom, 0 undecided.
     variance : (3,) float
         Variance of the blur per axis.
     inset : float
@@ -61,6 +63,7 @@ class Samples:
 
     points: Floats
     normals: Floats
+    side: Ints
     variance: Floats
     inset: float
 
@@ -169,6 +172,7 @@ def _accept(
     predicted = unit(side[:, None] * foot.normal - hu[:, None] * Pu - hv[:, None] * Pv)
     cos = np.einsum("ij,ij->i", samples.normals, predicted)
     good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
+    good &= side * samples.side >= 0  # else the sheet has run into another limb
     true_foot = foot.miss < 0.1
     rejected = near_any(samples.points, ~good & true_foot, options.erosion)
     return _Accepted(foot, height, side, flat, good & true_foot & ~rejected)

@@ -51,18 +51,20 @@ class Horizons:
         top, bottom = self.grid.value(self.top, u), self.grid.value(self.bottom, u)
         return bottom, np.maximum(top, bottom + 0.3)
 
-    def crossings(self, U: Floats, slip: Floats) -> tuple[Floats, Floats]:
+    def crossings(self, U: Floats, slip: Floats, limit: float) -> tuple[Floats, Floats]:
         """Return where normals of the mid surface at U (n, 2) meet bottom and top, (n,) each.
 
-        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by iteration.
+        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by damped
+        iteration.  Past the blocks, where heights are continued, t stays within the limit.
         """
         found = []
         for side in (0, 1):
-            t = self.heights(U)[side]
-            for _ in range(12):
-                t = self.heights(U - t[:, None] * slip)[side]
+            t = np.clip(self.heights(U)[side], -limit, limit)
+            for _ in range(20):
+                meets = np.clip(self.heights(U - t[:, None] * slip)[side], -limit, limit)
+                t = (t + meets) / 2
             found.append(t)
-        return found[0], found[1]
+        return found[0], np.maximum(found[1], found[0] + 0.3)
 
 
 def fit_horizons(

@@ -151,6 +151,7 @@ def _fit_sheet(
             _flattener(options),
             options.sheet_options,
             datum,
+            exact=hull is None,
         )
     mesh = result.mesh
     surfaces = {

@@ -108,7 +108,7 @@ def unfold(
         work = np.ascontiguousarray(frame.snap(frame.to_work(P)))
         groups = select_body(P, separate_bodies(work, frame), chosen.body)
     reference = _reference(top, bottom, frame)
-    fits = [fit(work[group], frame, chosen, reference, clock.stage) for group in groups]
+    fits = [fit(_sorted(work[group]), frame, chosen, reference, clock.stage) for group in groups]
     control = _joined([f.control for f in fits])
     with clock.stage("map"):
         mapping = UnfoldingMap(frame, control)
@@ -134,6 +134,11 @@ def unfold(
         fitted,
         len(torn),
     )
+
+
+def _sorted(points: Floats) -> Floats:
+    """Return points in lexicographic order, so that their sums do not know the rows' order."""
+    return points[np.lexsort(points.T[::-1])]
 
 
 TORN = 1.0

@@ -73,6 +73,7 @@ def fit_body(
     flatten: Flatten,
     options: SheetOptions,
     datum: str = "mid",
+    exact: bool = False,
 ) -> SheetResult:
     """Return the control mesh of a split body by the sheet method, and what led to it.
 
@@ -94,6 +95,8 @@ def fit_body(
         See there.
     datum : str
         Which surface is flat: mid, top, bottom or proportional.
+    exact : bool
+        The faces are the horizons themselves (reference surfaces): blocks do not correct them.
 
     Raises
     ------
@@ -107,7 +110,10 @@ def fit_body(
     medial = medial_sheet(split, parameters, options.medial)
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)
-    fitted, sharpened = _fitted(medial, samples, points, steps, options)
+    if exact:
+        fitted, sharpened = fit_sheet(medial, samples, points, options.fit), ""
+    else:
+        fitted, sharpened = _fitted(medial, samples, points, steps, options)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh, sharpened)

@@ -97,7 +97,7 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int) -> Footprint:
     """
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     V = U @ turn
-    low = V.min(axis=0) - (3 + dilation) * cell
+    low = V.min(axis=0) - (2.63 + dilation) * cell  # no foot on a cell's very edge
     shape = np.ceil((V.max(axis=0) - low) / cell).astype(int) + 3 + dilation
     at = np.floor((V - low) / cell).astype(np.int64)
     count = np.bincount(at[:, 0] * shape[1] + at[:, 1], minlength=shape.prod()).reshape(shape)

@@ -54,15 +54,16 @@ class Horizons:
     def crossings(self, U: Floats, slip: Floats, limit: float) -> tuple[Floats, Floats]:
         """Return where normals of the mid surface at U (n, 2) meet bottom and top, (n,) each.
 
-        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by damped
-        iteration.  Past the blocks, where heights are continued, t stays within the limit.
+        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by Newton's
+        method.  Past the blocks, where heights are continued, t stays within the limit.
         """
         found = []
-        for side in (0, 1):
-            t = np.clip(self.heights(U)[side], -limit, limit)
-            for _ in range(20):
-                meets = np.clip(self.heights(U - t[:, None] * slip)[side], -limit, limit)
-                t = (t + meets) / 2
+        for C in (self.bottom, self.top):
+            t = np.clip(self.grid.value(C, U), -limit, limit)
+            for _ in range(8):
+                height, hu, hv = self.grid.gradient(C, U - t[:, None] * slip)
+                rate = 1 + hu * slip[:, 0] + hv * slip[:, 1]
+                t = np.clip(t - (t - height) / np.maximum(rate, 0.3), -limit, limit)
             found.append(t)
         return found[0], np.maximum(found[1], found[0] + 0.3)
 

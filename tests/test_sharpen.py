@@ -19,7 +19,7 @@ RNG = np.random.default_rng(11)
 
 
 def test_sites_of_a_cube_of_27_blocks():
-    cells = np.array(list(product(range(3), repeat=3))) + [5, -7, 0]
+    cells = np.add(list(product(range(3), repeat=3)), [5, -7, 0])
     steps = np.array([2.0, 1.0, 0.5])
     sites = surface_sites(cells, steps)
     # 27 - 1 blocks have an empty neighbour; the shell around 3^3 is 5^3 - 3^3 sites.

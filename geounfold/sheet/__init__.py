@@ -54,8 +54,10 @@ class SheetOptions:
 
 @dataclass(frozen=True, eq=False)
 class SheetResult:
-    """Every stage of the sheet method, in working units; ``sharpened``: by lattice
-    ``sites``, by ``layers``, or by nothing (empty)."""
+    """Every stage of the sheet method, in working units.
+
+    ``sharpened``: by lattice ``sites``, by ``layers``, or by nothing (empty).
+    """
 
     medial: MedialSheet
     fitted: FittedSheet

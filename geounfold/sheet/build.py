@@ -103,9 +103,9 @@ class _Nodes:
     height t are ``P + t normal`` of either pair.
     """
 
-    chord_P: Floats
+    chord_points: Floats
     chord_normal: Floats
-    mean_P: Floats
+    mean_points: Floats
     mean_normal: Floats
 
 
@@ -139,7 +139,7 @@ def _flatten_sheet(
     nodes: _Nodes, prints: Footprint, reach: tuple[float, float], flatten: Flatten
 ) -> _FlatSheet:
     """Flatten the mid surface and the parallel surfaces ``reach`` above and below it."""
-    P, normal = nodes.chord_P, nodes.chord_normal
+    P, normal = nodes.chord_points, nodes.chord_normal
     middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
     above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid)
@@ -261,7 +261,7 @@ def build_control(
     follow = _offsets(prints, foot, caps, options)
     offsets = np.full_like(follow, reach) if constant else follow
     layers = Layers(
-        nodes.mean_P,
+        nodes.mean_points,
         nodes.mean_normal,
         flat.flat,
         flat.slopes[0],

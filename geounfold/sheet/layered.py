@@ -71,8 +71,10 @@ def layer_heights(t: Floats, half: Floats, clear: float) -> Floats | None:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Heights ``r`` that a displacement z and a change of half thickness d should explain:
-    ``r = A z + diag(f) H d``, with the energies of both."""
+    """Heights r that a displacement z and a change of half thickness d should explain.
+
+    ``r = A z + H d``; H has the layers' shares in it.  With the energies of both.
+    """
 
     r: Floats
     A: sp.csr_array

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from geounfold.sheet.spline import SplineGrid, spd_solver
+from geounfold.sheet.normal import spd_solver
+from geounfold.sheet.spline import SplineGrid
 from geounfold.sheet.surface import (
     Sheet,
     blur_shift,
@@ -30,7 +31,7 @@ def arch():
     grid = SplineGrid.over(LOW, HIGH, 3.5)
     U = LOW + RNG.random((6000, 2)) * (HIGH - LOW)
     B = grid.basis(U)
-    C = spd_solver(B.T @ B + 1e-9 * grid.energy(3))(B.T @ point(U))
+    C = spd_solver(B.T @ B + 1e-9 * grid.energy(3).sparse())(B.T @ point(U))
     return Sheet(grid, C, LOW, HIGH)
 
 
@@ -80,7 +81,7 @@ def test_a_blurred_ball_shrinks_as_the_shift_says():
     r = 40.0
     cap = np.column_stack([U, np.sqrt(r * r - (U**2).sum(axis=1)) - r])
     B = grid.basis(U)
-    C = spd_solver(B.T @ B + 1e-9 * grid.energy(3))(B.T @ cap)
+    C = spd_solver(B.T @ B + 1e-9 * grid.energy(3).sparse())(B.T @ cap)
     shift = blur_shift(grid.jet(C, np.zeros((1, 2))), np.zeros(1), np.full(3, 0.64))
     assert shift[0] == pytest.approx(-0.64 / r, rel=0.02)
 

@@ -25,16 +25,12 @@ def displacement_basis(sheet: Sheet, nodes: Floats, U: Floats, normal: Floats) -
     along ``normal`` (n, 3), the surface's at U (n, 2).
     """
     A = sheet.grid.basis(U)
-    along = np.einsum("nkd,nd->nk", nodes[A.indices.reshape(-1, 16)], normal)
+    columns = A.indices.reshape(-1, 16)
+    along = np.zeros(columns.shape)
+    for axis in range(3):
+        along += nodes[:, axis].take(columns) * normal[:, axis, None]
     A.data *= along.ravel()
     return A
-
-
-def between_normals(energy: sp.csc_array, nodes: Floats) -> sp.csc_array:
-    """Return an energy of surfaces as one of normal displacements of their coefficients."""
-    E = energy.tocoo()
-    cos = np.einsum("ij,ij->i", nodes[E.row], nodes[E.col])
-    return sp.csc_array((E.data * cos, (E.row, E.col)), shape=E.shape)
 
 
 def follow_feet(sheet: Sheet, Q: Floats, U: Floats, steps: int) -> Foot:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from geounfold.geometry import unit
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.sheet.medial import MedialSheet
-from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
+from geounfold.sheet.normal import Stencils, coupled_solver
+from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Foot, Sheet, blur_shift, near_any, slip_potential
+
+RIDGE = 1e-9
+"""Weight that holds coefficients which nothing else reaches."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,16 +107,12 @@ class _System:
     """The grid's energies and weights that every solve of the fit shares."""
 
     grid: SplineGrid
-    bending: sp.csc_array
-    third: sp.csc_array
+    bending: Stencils
+    third: Stencils
     half_weight: float
 
     def surface_weight(self, length: float) -> float:
         return (length / self.grid.step) ** 6
-
-    @property
-    def ridge(self) -> sp.csr_array:
-        return sp.csr_array(1e-9 * sp.eye_array(self.grid.size))
 
 
 def _start(
@@ -127,11 +126,11 @@ def _start(
     system = _System(grid, grid.energy(2), grid.energy(3), half_weight)
     w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
     B = grid.basis(medial.uv)
-    BtWB = B.T @ sp.diags_array(w) @ B + system.ridge
-    C = spd_solver(BtWB + system.surface_weight(options.smooth) * system.third)(
+    BtWB = grid.gram(B, w)
+    C = (BtWB + system.surface_weight(options.smooth) * system.third).solver(RIDGE)(
         B.T @ (w[:, None] * medial.mesh.V)
     )
-    half = spd_solver(BtWB + half_weight * system.bending)(B.T @ (w * medial.half))
+    half = (BtWB + half_weight * system.bending).solver(RIDGE)(B.T @ (w * medial.half))
     return system, Sheet(grid, C, low, high, options.cell), half
 
 
@@ -201,15 +200,12 @@ def _refit(
     U, t, s = accepted.foot.U[keep], accepted.height[keep], accepted.side[keep]
     w = _side_weights(accepted, options.knots)
     B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
-    W, Ws = sp.diags_array(w), sp.diags_array(w * s)
-    BtWB = B.T @ W @ B + system.ridge
-    K = sp.block_array(
-        [
-            [BtWB + system.surface_weight(smoothing) * system.third, B.T @ Ws @ H],
-            [H.T @ Ws @ B, H.T @ W @ H + system.half_weight * system.bending + system.ridge],
-        ]
-    )
-    z = spd_solver(K)(np.concatenate([B.T @ (w * t), H.T @ (w * s * t)]))
+    BtWB = system.grid.gram(B, w)
+    surface = BtWB + system.surface_weight(smoothing) * system.third
+    thickness = system.grid.gram(H, w) + system.half_weight * system.bending
+    cross = B.T @ H.multiply((w * s)[:, None]).tocsr()
+    solve = coupled_solver(surface, thickness, cross, RIDGE)
+    z = solve(np.concatenate([B.T @ (w * t), H.T @ (w * s * t)]))
     half = z[system.grid.size :]
     mid = t - s * (H @ half)
     residual = mid - B @ z[: system.grid.size]
@@ -217,7 +213,7 @@ def _refit(
     stretch = np.interp(roughness, [options.quiet, options.loud], [1.0, options.rough])
     smoothing = options.smooth * float(stretch)
     points = sheet.at(U) + mid[:, None] * accepted.foot.normal[keep]
-    C = spd_solver(BtWB + system.surface_weight(smoothing) * system.third)(
+    C = (BtWB + system.surface_weight(smoothing) * system.third).solver(RIDGE)(
         B.T @ (w[:, None] * points)
     )
     return sheet.with_coefficients(C), half, w, roughness, smoothing

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from geounfold.mesh import Floats
-from geounfold.sheet.fit import FittedSheet, Samples, unbiased_heights
-from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
+from geounfold.sheet.fit import RIDGE, FittedSheet, Samples, unbiased_heights
+from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import near_any
 
 
@@ -81,22 +80,18 @@ def fit_horizons(
     rim = near_any(samples.points, np.abs(cos) < options.agree, options.erosion)
     nodes, _ = sheet.samples()
     P = grid.basis(nodes)
-    half = _as_spline(P, np.maximum(grid.value(fitted.half, nodes), 0.2))
+    sampled = grid.gram(P, np.ones(len(nodes)))
+    half = sampled.solver(RIDGE)(P.T @ np.maximum(grid.value(fitted.half, nodes), 0.2))
     expected = grid.value(half, flat)
     bending = (options.smooth / knots) ** 4 * grid.energy(2)
-    still = options.stiffness * (P.T @ P) + 1e-12 * sp.eye_array(grid.size)
+    still = bending + options.stiffness * sampled
     found = []
     for s in (1.0, -1.0):
         use = (foot.miss < 0.1) & (side == s) & ~rim
         use &= np.abs(s * foot.t - expected) < options.misfit
         B = grid.basis(flat[use])
         w = density_weights(flat[use], knots) if use.any() else np.empty(0)
-        K = B.T @ sp.diags_array(w) @ B + bending + still
-        rest = spd_solver(K)(B.T @ (w * (height[use] - s * expected[use])))
+        K = grid.gram(B, w) + still
+        rest = K.solver(ridge=1e-12)(B.T @ (w * (height[use] - s * expected[use])))
         found.append(rest + s * half)
     return Horizons(grid, found[0], found[1])
-
-
-def _as_spline(P: sp.csr_array, values: Floats) -> Floats:
-    """Return the coefficients whose spline takes values at the nodes of basis P."""
-    return spd_solver(P.T @ P + 1e-9 * sp.eye_array(P.shape[1]))(P.T @ values)

@@ -14,13 +14,13 @@ import scipy.sparse as sp
 
 from geounfold.mesh import Bools, Floats
 from geounfold.sheet.displace import (
-    between_normals,
     displacement_basis,
     follow_feet,
     node_normals,
 )
-from geounfold.sheet.fit import FittedSheet
-from geounfold.sheet.spline import density_weights, spd_solver
+from geounfold.sheet.fit import RIDGE, FittedSheet
+from geounfold.sheet.normal import Stencils
+from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import slip_potential
 
 
@@ -79,25 +79,25 @@ class _Problem:
     r: Floats
     A: sp.csr_array
     H: sp.csr_array
-    bending: sp.csc_array
+    bending: Stencils
     pull: Floats
-    half_energy: sp.csc_array
+    half_energy: Stencils
     half_pull: Floats
-    knots: float
+    grid: SplineGrid
     layers: int
 
     def solve(self, smooth: float, smooth_half: float, use: Bools) -> tuple[Floats, Floats]:
         """Return z, then d, fitted to some of the points."""
         weight = len(use) / int(use.sum()) / self.layers
-        tiny = 1e-9 * sp.eye_array(self.A.shape[1])
-        stiff = (smooth / self.knots) ** 8
-        even = (max(smooth, smooth_half) / self.knots) ** 6
+        stiff = (smooth / self.grid.step) ** 8
+        even = (max(smooth, smooth_half) / self.grid.step) ** 6
         A, H, r = self.A[use], self.H[use], self.r[use]
-        K = weight * (A.T @ A) + stiff * self.bending + tiny
-        z = spd_solver(K)(weight * (A.T @ r) - stiff * self.pull)
+        every = np.full(A.shape[0], weight)
+        K = self.grid.gram(A, every) + stiff * self.bending
+        z = K.solver(RIDGE)(weight * (A.T @ r) - stiff * self.pull)
         r = r - A @ z
-        K = weight * (H.T @ H) + even * self.half_energy + tiny
-        d = spd_solver(K)(weight * (H.T @ r) - even * self.half_pull)
+        K = self.grid.gram(H, every) + even * self.half_energy
+        d = K.solver(RIDGE)(weight * (H.T @ r) - even * self.half_pull)
         return z, d
 
     def left(self, z: Floats, d: Floats, use: Bools) -> float:
@@ -143,11 +143,11 @@ def sharpen_layers(
             foot.t - H @ half,
             displacement_basis(sheet, nodes, U, foot.normal),
             H,
-            between_normals(rough, nodes),
+            rough.between(nodes),
             np.einsum("ij,ij->i", nodes, rough @ sheet.C),
             fine,
             fine @ half,
-            grid.step,
+            grid,
             len(np.unique(level)),
         )
         if turn == 1:

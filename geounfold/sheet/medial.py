@@ -20,7 +20,7 @@ from geounfold.geometry import (
     vertex_sum,
 )
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
-from geounfold.sheet.spline import spd_solver
+from geounfold.sheet.normal import spd_solver
 from geounfold.sheet.surface import near_any
 from geounfold.split import SurfaceSplit
 

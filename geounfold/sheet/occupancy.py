@@ -17,14 +17,14 @@ from scipy.special import expit
 
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.sheet.displace import (
-    between_normals,
     displacement_basis,
     follow_feet,
     node_normals,
 )
-from geounfold.sheet.fit import FittedSheet
+from geounfold.sheet.fit import RIDGE, FittedSheet
+from geounfold.sheet.normal import Stencils, gram
 from geounfold.sheet.sites import Sites
-from geounfold.sheet.spline import SplineGrid, density_weights, spd_solver
+from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Foot, Sheet, near_any, slip_potential
 
 
@@ -167,8 +167,8 @@ def _step(
     margin: float,
     smooth: float,
     smooth_half: float,
-    rough: sp.csc_array,
-    fine: sp.csc_array,
+    rough: Stencils,
+    fine: Stencils,
 ) -> _Round:
     """Take one Newton step in the surface, then one in the half thickness.
 
@@ -177,15 +177,14 @@ def _step(
     of the moved surface (weight (smooth / knots)^8) and the third of the half thickness.
     """
     knots = sheet.grid.step
-    tiny = 1e-9 * sp.eye_array(sheet.grid.size)
     stiff = (smooth / knots) ** 8
-    turned = between_normals(rough, nodes)
     pull = np.einsum("ij,ij->i", nodes, rough @ sheet.C)
     m = views.height - views.H @ half
-    z = _newton(views.A, m, views.occupied, margin, knots, stiff * turned + tiny, stiff * pull)
+    stiffness = stiff * rough.between(nodes)
+    z = _newton(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull)
     m = m - views.A @ z
     even = (smooth_half / knots) ** 6 * fine
-    dh = _newton(views.H, m, views.occupied, margin, knots, even + tiny, even @ half)
+    dh = _newton(views.H, m, views.occupied, margin, knots, even, even @ half)
     m = m - views.H @ dh
     wrong = np.where(views.occupied, m, -m)
     moved = sheet.with_coefficients(sheet.C + nodes * z[:, None])
@@ -199,14 +198,14 @@ def _newton(
     occupied: Bools,
     margin: float,
     knots: float,
-    stiffness: sp.csc_array,
+    stiffness: Stencils,
     pull: Floats,
 ) -> Floats:
     """Return a Newton step x for ``m - A x``, no coefficient longer than ten margins."""
     slope = (expit(m / margin) - ~occupied) / knots**2
     bend = 0.25 / np.cosh(np.clip(m / (2 * margin), -20, 20)) ** 2
     weight = np.maximum(bend, 1e-4) / (margin * knots**2)
-    K = A.T @ sp.diags_array(weight) @ A + stiffness
-    x = spd_solver(K)(A.T @ slope - pull)
+    K = gram(A, weight, stiffness.shape) + stiffness
+    x = K.solver(RIDGE)(A.T @ slope - pull)
     longest = float(np.abs(x).max())
     return x * min(1.0, 10 * margin / longest) if longest > 0 else x

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from geounfold.backends.igl import SurfaceIndex, barycentric_in_triangles
 from geounfold.geometry import unit
 from geounfold.mesh import Bools, Floats, Ints
-from geounfold.sheet.spline import Jet, SplineGrid, spd_solver
+from geounfold.sheet.normal import Stencils
+from geounfold.sheet.spline import Jet, SplineGrid
 
 
 class Foot(NamedTuple):
@@ -181,7 +181,7 @@ def blur_shift(jet: Jet, t: Floats, variance: Floats) -> Floats:
     return (first + along(cos * jet.v - sin * jet.u, mean - spread)) / 2
 
 
-def slip_potential(sheet: Sheet, U: Floats, weights: Floats, bending: sp.csc_array) -> Floats:
+def slip_potential(sheet: Sheet, U: Floats, weights: Floats, bending: Stencils) -> Floats:
     """Return coefficients (size, 2) of phi with grad phi = second form (flexural slip).
 
     Before folding, the point at offset t over U lay at u = U - t phi(U); the free constant
@@ -192,11 +192,10 @@ def slip_potential(sheet: Sheet, U: Floats, weights: Floats, bending: sp.csc_arr
     jet = sheet.jet(U)
     L, M, N = second_form(jet, normals(jet))
     Bu, Bv = grid.basis(U, 1, 0), grid.basis(U, 0, 1)
-    W = sp.diags_array(weights * grid.step**2)
-    K = Bu.T @ W @ Bu + Bv.T @ W @ Bv + 1e-3 * bending + 1e-9 * sp.eye_array(grid.size)
     w = weights * grid.step**2
+    K = grid.gram(Bu, w) + grid.gram(Bv, w) + 1e-3 * bending
     rhs = np.stack([Bu.T @ (w * L) + Bv.T @ (w * M), Bu.T @ (w * M) + Bv.T @ (w * N)], axis=1)
-    phi = spd_solver(K)(rhs)
+    phi = K.solver(ridge=1e-9)(rhs)
     mean: Floats = np.average(grid.value(phi, U), axis=0, weights=weights)
     return phi - mean
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from geounfold.control import ControlMesh
 from geounfold.errors import ControlMeshError
-from geounfold.geometry import lengths
+from geounfold.geometry import lengths, sorted_distinct
 from geounfold.mesh import Floats, Ints, TetMesh
 
 
@@ -122,7 +122,7 @@ def tet_edges(T: Ints) -> Ints:
     """
     corners = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
     E = np.sort(np.concatenate([T[:, list(pair)] for pair in corners]), axis=1)
-    key = np.unique(E[:, 0] * (int(T.max(initial=0)) + 1) + E[:, 1])
+    key = sorted_distinct(E[:, 0] * (int(T.max(initial=0)) + 1) + E[:, 1])
     return np.stack(np.divmod(key, int(T.max(initial=0)) + 1), axis=1)
 
 

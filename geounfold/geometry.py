@@ -22,6 +22,19 @@ def unique_edges(F: Ints) -> Ints:
     return np.ascontiguousarray(E[first])
 
 
+def sorted_distinct(keys: Ints) -> Ints:
+    """Return the distinct values of keys (n,) in increasing order, faster than np.unique.
+
+    >>> sorted_distinct(np.array([3, 1, 3])).tolist()
+    [1, 3]
+    """
+    ordered = np.sort(keys)
+    fresh = np.ones(len(keys), dtype=bool)
+    np.not_equal(ordered[1:], ordered[:-1], out=fresh[1:])
+    out: Ints = ordered[fresh]
+    return out
+
+
 def lengths(V: Floats, E: Ints) -> Floats:
     """Return the length of each edge, (k,), in the vertices' unit."""
     out: Floats = np.linalg.norm(V[E[:, 1]] - V[E[:, 0]], axis=1)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 from scipy.special import expit
 
 from geounfold.mesh import Bools, Floats, Ints
@@ -24,8 +25,8 @@ from geounfold.sheet.displace import (
 from geounfold.sheet.fit import RIDGE, FittedSheet
 from geounfold.sheet.normal import Stencils, gram
 from geounfold.sheet.sites import Sites
-from geounfold.sheet.spline import SplineGrid, density_weights
-from geounfold.sheet.surface import Foot, Sheet, near_any, slip_potential
+from geounfold.sheet.spline import density_weights
+from geounfold.sheet.surface import Sheet, slip_potential
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +40,7 @@ class OccupancyOptions:
     inside the layer is the rim's, not a horizon's; ``depths``: how far below the horizon that
     is, round by round; ``band``: largest distance of a site from its horizon; ``thinnest``,
     ``taper``: half thickness below which, and its slope above which, sites are left alone;
+    ``slack``: how far sites past those limits are followed all the same, as the sheet moves;
     ``misfit``: mean depth on the wrong side above which the first fit is kept.
     """
 
@@ -54,6 +56,7 @@ class OccupancyOptions:
     band: float = 1.2
     thinnest: float = 1.0
     taper: float = 0.25
+    slack: float = 0.5
     misfit: float = 0.01
 
 
@@ -99,23 +102,21 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     foot = sheet.search(fitted.near, reach=8.0).feet(sites.points)
     seen = foot.miss < 0.02
-    sites = Sites(sites.points[seen], sites.occupied[seen])
-    U = foot.U[seen]
+    places = _Places.at(Sites(sites.points[seen], sites.occupied[seen]), foot.U[seen])
     rough, fine = grid.energy(4), grid.energy(3)
     smooth, last = options.smooth, None
     used = fitted.near
     for k, margin in enumerate(options.margins):
-        foot = follow_feet(sheet, sites.points, U, steps=1 if k else 0)
-        U = foot.U
-        flat = U - foot.t[:, None] * grid.value(fitted.slip, U)
         depth = options.depths[min(k, len(options.depths) - 1)]
-        use = _explained(grid, half, sites, foot, flat, margin, depth, options)
+        places.follow(sheet, half, fitted.slip, steps=1 if k else 0)
+        use = places.explained(margin, depth, options)
         if not len(use):
             return None
         nodes = node_normals(sheet)
-        views = _views(sheet, nodes, sites, foot, flat, use)
+        views = _views(sheet, nodes, places, use)
         last = _step(sheet, half, nodes, views, margin, smooth, options.smooth_half, rough, fine)
-        sheet, half, used = last.sheet, last.half, U[use]
+        sheet, half, used = last.sheet, last.half, places.U[use]
+        places.watch(margin, options)
         if margin <= options.adapt and last.wrong > options.tolerated:
             smooth = max(smooth / options.pace, options.least)
     if last is None or last.depth > options.misfit:
@@ -125,38 +126,83 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
 
 
-def _explained(
-    grid: SplineGrid,
-    half: Floats,
-    sites: Sites,
-    foot: Foot,
-    flat: Floats,
-    margin: float,
-    depth: float,
-    options: OccupancyOptions,
-) -> Ints:
-    """Return the sites that a horizon explains, not the rim (indices).
+def _clearance(margin: float) -> float:
+    """Return how far on its own side of a horizon a site still says something."""
+    return max(0.15, 6 * margin)
 
-    An empty site well inside the layer lies beyond the rim, and so do those around it; where
-    the layer tapers steeply, horizon and rim are one.
+
+@dataclass(eq=False)
+class _Places:
+    """Where the sites lie in the sheet's coordinates; those watched are followed as it moves.
+
+    ``U`` (n, 2) feet, ``t`` (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded
+    parameters; ``half`` (n,) half thickness and ``taper`` (n,) its slope there; ``watched``
+    (w,) rows.
     """
-    thickness, hu, hv = grid.gradient(half, flat)
-    away = np.abs(foot.t)  # distance from the mid surface, on whichever side
-    beyond = away - thickness
-    hole = ~sites.occupied & (-beyond > np.minimum(depth, 0.6 * thickness))
-    clear = np.where(sites.occupied, -beyond, beyond) < max(0.15, 6 * margin)
-    good = clear & (np.abs(beyond) < options.band) & (thickness > options.thinnest)
-    good &= np.hypot(hu, hv) < options.taper
-    good &= ~near_any(flat, hole, options.rim)
-    return np.flatnonzero(good)
+
+    sites: Sites
+    U: Floats
+    t: Floats
+    normal: Floats
+    flat: Floats
+    half: Floats
+    taper: Floats
+    watched: Ints
+
+    @classmethod
+    def at(cls, sites: Sites, U: Floats) -> _Places:
+        """Return sites at feet U (n, 2), the rest to be found by `follow`."""
+        n = len(U)
+        blank = (np.empty(n) for _ in range(3))
+        t, half, taper = blank
+        return cls(sites, U, t, np.empty((n, 3)), np.empty((n, 2)), half, taper, np.arange(n))
+
+    @property
+    def beyond(self) -> Floats:
+        """Height over the horizon on the site's side of the mid surface, (n,)."""
+        return np.abs(self.t) - self.half  # distance from the mid surface, on whichever side
+
+    @property
+    def right(self) -> Floats:
+        """Distance from the horizon on the side where the site belongs, (n,)."""
+        beyond = self.beyond
+        return np.where(self.sites.occupied, -beyond, beyond)
+
+    def follow(self, sheet: Sheet, half: Floats, slip: Floats, steps: int) -> None:
+        """Find the watched sites' places anew."""
+        rows, grid = self.watched, sheet.grid
+        foot = follow_feet(sheet, self.sites.points[rows], self.U[rows], steps)
+        flat = foot.U - foot.t[:, None] * grid.value(slip, foot.U)
+        thickness, hu, hv = grid.gradient(half, flat)
+        self.U[rows], self.t[rows], self.normal[rows] = foot.U, foot.t, foot.normal
+        self.flat[rows], self.half[rows], self.taper[rows] = flat, thickness, np.hypot(hu, hv)
+
+    def watch(self, margin: float, options: OccupancyOptions) -> None:
+        """Watch only sites that may be used, or mark the rim, with this margin or a smaller one."""
+        near = self.right[self.watched] < _clearance(margin) + options.slack
+        self.watched = self.watched[near]
+
+    def explained(self, margin: float, depth: float, options: OccupancyOptions) -> Ints:
+        """Return the sites that a horizon explains, not the rim (indices).
+
+        An empty site well inside the layer lies beyond the rim, and so do those around it; where
+        the layer tapers steeply, horizon and rim are one.
+        """
+        beyond, thickness = self.beyond, self.half
+        hole = ~self.sites.occupied & (-beyond > np.minimum(depth, 0.6 * thickness))
+        good = (self.right < _clearance(margin)) & (np.abs(beyond) < options.band)
+        good &= (thickness > options.thinnest) & (self.taper < options.taper)
+        use = np.flatnonzero(good)
+        rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=options.rim)[0]
+        return use[np.asarray(rim > options.rim)]
 
 
-def _views(
-    sheet: Sheet, nodes: Floats, sites: Sites, foot: Foot, flat: Floats, use: Ints
-) -> _Views:
-    side = np.sign(foot.t[use])
-    A = displacement_basis(sheet, nodes, foot.U[use], foot.normal[use] * side[:, None])
-    return _Views(side * foot.t[use], sites.occupied[use], A, sheet.grid.basis(flat[use]))
+def _views(sheet: Sheet, nodes: Floats, places: _Places, use: Ints) -> _Views:
+    t = places.t[use]
+    side = np.sign(t)
+    A = displacement_basis(sheet, nodes, places.U[use], places.normal[use] * side[:, None])
+    H = sheet.grid.basis(places.flat[use])
+    return _Views(side * t, places.sites.occupied[use], A, H)
 
 
 def _step(

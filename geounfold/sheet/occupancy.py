@@ -194,7 +194,8 @@ class _Places:
         good &= (thickness > options.thinnest) & (self.taper < options.taper)
         use = np.flatnonzero(good)
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=options.rim)[0]
-        return use[np.asarray(rim > options.rim)]
+        out: Ints = use[rim > options.rim]
+        return out
 
 
 def _views(sheet: Sheet, nodes: Floats, places: _Places, use: Ints) -> _Views:

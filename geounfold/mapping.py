@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,9 @@ from geounfold.mesh import Bools, Floats, Ints, TetMesh
 
 FORMAT = "geounfold-map"
 FORMAT_VERSION = 1
+
+TURNED_OVER = np.array([1.0, -1.0, -1.0])
+"""Half a turn about the flat space's x axis: what exchanges top and bottom."""
 
 INSIDE, EXTRAPOLATED = "inside", "extrapolated"
 
@@ -71,20 +75,35 @@ class Carried:
 class _Space:
     """One space of a control mesh, indexed for point location."""
 
-    def __init__(self, mesh: TetMesh) -> None:
+    def __init__(self, mesh: TetMesh, known: Sequence[TetIndex]) -> None:
         self._mesh = mesh
-        self._index = TetIndex(mesh.V, mesh.T)
+        self._turn: Floats | None = None
+        self._index = self._found(known) or TetIndex(mesh.V, mesh.T)
+
+    def _found(self, known: Sequence[TetIndex]) -> TetIndex | None:
+        """Return the tree among those known that is this mesh's, as it is or turned over."""
+        V, T = self._mesh.V, self._mesh.T
+        for index in known:
+            if index.V.shape != V.shape or not np.array_equal(index.T, T):
+                continue
+            for turn in (None, TURNED_OVER):
+                if np.array_equal(index.V if turn is None else index.V * turn, V):
+                    self._turn = turn
+                    return index
+        return None
 
     @cached_property
     def _border(self) -> tuple[SurfaceIndex, Ints]:
         faces, owner = boundary_faces(self._mesh.T)
-        return SurfaceIndex(self._mesh.V, faces), owner
+        return SurfaceIndex(self._index.V, faces), owner
 
     def locate(self, points: Floats) -> tuple[Ints, Bools, Floats]:
         """Return element, inside and barycentric coordinates of points (n, 3).
 
         A point outside takes the element behind the nearest boundary face.
         """
+        if self._turn is not None:
+            points = points * self._turn
         element = self._index.locate(points)
         inside = element >= 0
         if not inside.all():
@@ -104,19 +123,22 @@ class UnfoldingMap:
         Working frame of the control mesh.
     control : ControlMesh
         In working units.
+    known : sequence of TetIndex, optional
+        Trees already built, used where they are over a space of the control mesh.
     """
 
-    def __init__(self, frame: Frame, control: ControlMesh) -> None:
+    def __init__(self, frame: Frame, control: ControlMesh, known: Sequence[TetIndex] = ()) -> None:
         self.frame = frame
         self.control = control
+        self._known = tuple(known)
 
     @cached_property
     def _folded(self) -> _Space:
-        return _Space(self.control.folded)
+        return _Space(self.control.folded, self._known)
 
     @cached_property
     def _unfolded(self) -> _Space:
-        return _Space(self.control.unfolded)
+        return _Space(self.control.unfolded, self._known)
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
         """Carry points to the flat space, or with ``inverse`` from it back.

@@ -111,7 +111,8 @@ def unfold(
     fits = [fit(_sorted(work[group]), frame, chosen, reference, clock.stage) for group in groups]
     control = _joined([f.control for f in fits])
     with clock.stage("map"):
-        mapping = UnfoldingMap(frame, control)
+        known = [index for f in fits if f.sheet for index in f.sheet.mesh.indices]
+        mapping = UnfoldingMap(frame, control, known)
         carried = mapping.carry(P)
         back = mapping.carry(carried.points, inverse=True)
     with clock.stage("quality"):

@@ -62,6 +62,8 @@ class SheetMesh:
         Steps of the shrinking rung.
     surfaces : dict of (TriMesh, TriMesh)
         Mid, top and bottom surface, folded and unfolded, over the footprint.
+    indices : tuple of TetIndex
+        Trees that were built over the prisms in either space; none after a repair that failed.
     """
 
     control: ControlMesh
@@ -70,6 +72,7 @@ class SheetMesh:
     rung: str
     shrinks: int
     surfaces: dict[str, tuple[TriMesh, TriMesh]]
+    indices: tuple[TetIndex, ...] = ()
 
 
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
@@ -178,10 +181,9 @@ def _offsets(prints: Footprint, foot: Foot, caps: Floats, options: ControlOption
     return np.minimum(np.stack(follow), caps)
 
 
-def _round_trip_misses(layers: Layers, T: Ints, points: Floats, limit: float) -> Ints:
-    """Return the footprint nodes of tetrahedra holding blocks that do not come back."""
-    folded, unfolded = layers.folded, layers.unfolded
-    there, back = TetIndex(folded, T), TetIndex(unfolded, T)
+def _round_trip_misses(there: TetIndex, back: TetIndex, points: Floats, limit: float) -> Ints:
+    """Return the vertices of tetrahedra holding blocks that do not come back."""
+    folded, unfolded, T = there.V, back.V, there.T
     first = there.locate(points)
     inside = first >= 0
     b = there.barycentric(points[inside], first[inside])
@@ -190,13 +192,16 @@ def _round_trip_misses(layers: Layers, T: Ints, points: Floats, limit: float) ->
     other = np.where(second >= 0, second, first[inside])
     returned = np.einsum("ij,ijk->ik", back.barycentric(flat, other), folded[T[other]])
     missed = np.abs(returned - points[inside]).max(axis=1) > limit
-    return np.unique(T[np.concatenate([first[inside][missed], other[missed]])] % len(layers.P))
+    vertices: Ints = T[np.concatenate([first[inside][missed], other[missed]])].ravel()
+    return vertices
 
 
 def _climb(
     layers: Layers, follow: Floats, constant: bool, points: Floats, options: ControlOptions
-) -> tuple[Layers, str, int]:
+) -> tuple[Layers, str, int, tuple[TetIndex, ...]]:
     """Return layers that are upright in both spaces and bring every block back.
+
+    With them the last rung, the shrinks, and where blocks were carried the trees of both spaces.
 
     Rungs: constant offsets (parallel surfaces), offsets that follow the blocks under the
     focal cap, then shrinking around what is still wrong.
@@ -206,15 +211,19 @@ def _climb(
     rung = "constant" if constant else "capped"
     for shrinks in range(options.shrinks + 1):
         nodes = bad_nodes(layers, T)
+        indices: tuple[TetIndex, ...] = ()
         if not len(nodes):
-            nodes = _round_trip_misses(layers, T, points, options.trip)
+            there, back = TetIndex(layers.folded, T), TetIndex(layers.unfolded, T)
+            indices = (there, back)
+            missed = _round_trip_misses(there, back, points, options.trip)
+            nodes = np.unique(missed % len(layers.P))
         if not len(nodes) or shrinks == options.shrinks:
             break
         if rung == "constant":
             rung, layers = "capped", replace(layers, up=follow[0], down=follow[1])
             continue
         rung, layers = "shrunk", shrink(layers, nodes, mean)
-    return layers, rung, shrinks
+    return layers, rung, shrinks, indices
 
 
 def build_control(
@@ -271,7 +280,7 @@ def build_control(
         offsets[0],
         offsets[1],
     )
-    layers, rung, shrinks = _climb(layers, follow, constant, points, options)
+    layers, rung, shrinks, indices = _climb(layers, follow, constant, points, options)
     slip = sheet.grid.value(fitted.slip, prints.U)
     bottom, top = horizons.crossings(prints.U, slip, limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
@@ -295,4 +304,4 @@ def build_control(
         TetMesh(np.concatenate(vertices), T),
         np.concatenate(stratigraphic),
     )
-    return SheetMesh(control, flat.flattenings, layers, rung, shrinks, surfaces)
+    return SheetMesh(control, flat.flattenings, layers, rung, shrinks, surfaces, indices)

@@ -165,6 +165,7 @@ def _fit_sheet(
         "smoothing": result.fitted.smoothing,
         "accepted_samples": result.fitted.accepted,
         "sharpened": result.sharpened,
+        "layers_follow": {0.0: "mid", 1.0: "top", -1.0: "bottom"}[result.fitted.lean],
     }
     return BodyFit(hull, parts, mesh.control, surfaces, mesh.flattenings, result, notes)
 
@@ -238,6 +239,9 @@ def _turned_over(result: BodyFit) -> BodyFit:
     }
     flattenings = {_OTHER_SIDE.get(name, name): f for name, f in result.flattenings.items()}
     parts = result.split
+    notes = dict(result.notes)
+    if "layers_follow" in notes:
+        notes["layers_follow"] = _OTHER_SIDE.get(str(notes["layers_follow"]), "mid")
     turned = SurfaceSplit(
         parts.mesh,
         -parts.side,
@@ -248,7 +252,7 @@ def _turned_over(result: BodyFit) -> BodyFit:
         parts.adjacency,
         not parts.flipped_up,
     )
-    return BodyFit(result.hull, turned, control, surfaces, flattenings, result.sheet, result.notes)
+    return BodyFit(result.hull, turned, control, surfaces, flattenings, result.sheet, notes)
 
 
 def _check_upright(control: ControlMesh, frame: Frame, options: UnfoldOptions) -> None:

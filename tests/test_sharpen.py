@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geounfold as gu
-from geounfold.sheet import LayerOptions, OccupancyOptions, SheetOptions
+from geounfold.sheet import ConformOptions, LayerOptions, OccupancyOptions, SheetOptions
 from geounfold.sheet.displace import displacement_basis, node_normals
 from geounfold.sheet.layered import layer_heights, scatter, sharpen_layers
 from geounfold.sheet.occupancy import sharpen
@@ -119,3 +119,25 @@ def test_more_points_than_asked_for_are_thinned_evenly():
     U = fitted.near
     # Both fits go through the same layers: measured 0.00003 blocks apart.
     assert np.abs(all_.sheet.at(U) - some.sheet.at(U)).max() < 0.001
+
+
+def test_layers_follow_the_side_that_does_not_bulge():
+    body = simulate("bulge", blocks=15000)
+    never = SheetOptions(conform=ConformOptions(share=0.0))
+    middle, chosen = gu.unfold(body.folded, sheet_options=never), gu.unfold(body.folded)
+    flat = "bottom" if np.ptp(body.bottom) < np.ptp(body.top) else "top"
+    assert (middle.fits[0].notes["layers_follow"], chosen.fits[0].notes["layers_follow"]) == (
+        "mid",
+        flat,
+    )
+    off = [gu.aligned_rms(u.points, body.truth) / u.frame.scale for u in (middle, chosen)]
+    # Measured 0.75 blocks with the mid surface, 0.12 with the bottom.
+    assert off[1] < off[0] / 2
+    down = gu.unfold(body.folded, up=(0.0, 0.0, -1.0))
+    other = {"top": "bottom", "bottom": "top"}
+    assert down.fits[0].notes["layers_follow"] == other[flat]
+
+
+def test_layers_follow_the_middle_of_a_swell():
+    u = gu.unfold(simulate("swelling", blocks=16000).folded)
+    assert u.fits[0].notes["layers_follow"] == "mid"

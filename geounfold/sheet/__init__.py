@@ -9,6 +9,7 @@ import numpy as np
 from geounfold.geometry import vertex_sum
 from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
+from geounfold.sheet.conform import ConformOptions, conform
 from geounfold.sheet.fit import FitOptions, FittedSheet, Samples, fit_sheet
 from geounfold.sheet.horizons import HorizonOptions, Horizons, fit_horizons
 from geounfold.sheet.layered import LayerOptions, sharpen_layers
@@ -18,6 +19,7 @@ from geounfold.sheet.sites import surface_sites
 from geounfold.split import SurfaceSplit
 
 __all__ = [
+    "ConformOptions",
     "ControlOptions",
     "FitOptions",
     "FittedSheet",
@@ -48,6 +50,7 @@ class SheetOptions:
     occupancy: OccupancyOptions = field(default_factory=OccupancyOptions)
     horizons: HorizonOptions = field(default_factory=HorizonOptions)
     layers: LayerOptions = field(default_factory=LayerOptions)
+    conform: ConformOptions = field(default_factory=ConformOptions)
     control: ControlOptions = field(default_factory=ControlOptions)
     refused_rough: float = 1.25
 
@@ -116,6 +119,7 @@ def fit_body(
         fitted, sharpened = fit_sheet(medial, samples, points, options.fit), ""
     else:
         fitted, sharpened = _fitted(medial, samples, points, steps, options)
+    fitted = conform(fitted, medial, parameters, options.conform)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh, sharpened)

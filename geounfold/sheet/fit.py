@@ -91,6 +91,9 @@ class FittedSheet:
         Smoothing length used, in blocks.
     accepted : float
         Share of the samples accepted.
+    lean, level : float
+        Where the sheet was moved onto the surface that layers run parallel to (see conform):
+        side and median half thickness.
     """
 
     sheet: Sheet
@@ -100,6 +103,12 @@ class FittedSheet:
     roughness: float
     smoothing: float
     accepted: float
+    lean: float = 0.0
+    level: float = 0.0
+
+    def reach(self, side: float, half: Floats) -> Floats:
+        """Return the distance from the sheet to its top (side 1) or bottom (-1), (n,)."""
+        return half - side * self.lean * (half - self.level)
 
 
 @dataclass(frozen=True, eq=False)

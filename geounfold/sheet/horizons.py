@@ -82,16 +82,17 @@ def fit_horizons(
     P = grid.basis(nodes)
     sampled = grid.gram(P, np.ones(len(nodes)))
     half = sampled.solver(RIDGE)(P.T @ np.maximum(grid.value(fitted.half, nodes), 0.2))
-    expected = grid.value(half, flat)
     bending = (options.smooth / knots) ** 4 * grid.energy(2)
     still = bending + options.stiffness * sampled
     found = []
     for s in (1.0, -1.0):
+        reach = fitted.reach(s, half)
+        expected = grid.value(reach, flat)
         use = (foot.miss < 0.1) & (side == s) & ~rim
         use &= np.abs(s * foot.t - expected) < options.misfit
         B = grid.basis(flat[use])
         w = density_weights(flat[use], knots) if use.any() else np.empty(0)
         K = grid.gram(B, w) + still
         rest = K.solver(ridge=1e-12)(B.T @ (w * (height[use] - s * expected[use])))
-        found.append(rest + s * half)
+        found.append(rest + s * reach)
     return Horizons(grid, found[0], found[1])

@@ -2,7 +2,7 @@
 
 Every ``draw_`` function returns a matplotlib Figure that belongs to no window; `png` turns one
 into bytes.  Three-dimensional views are rendered off screen by VTK and set into the figure, at
-true scale, in parallel projection.  Needs the extra ``geounfold[view]``.
+true scale, in parallel projection.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def require(name: str) -> Any:
     except ImportError as error:
         raise MissingDependencyError(
             f"pictures need {name.partition('.')[0]}, which cannot be imported ({error}): "
-            "pip install 'geounfold[view]'"
+            "pip install matplotlib pyvista"
         ) from error
 
 

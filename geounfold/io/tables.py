@@ -188,7 +188,7 @@ def _pyarrow() -> ModuleType:
         import pyarrow.parquet
     except ImportError as error:
         raise MissingDependencyError(
-            "Parquet files need pyarrow: pip install 'geounfold[parquet]'"
+            "Parquet files need pyarrow: pip install pyarrow"
         ) from error
     module: ModuleType = pyarrow
     return module

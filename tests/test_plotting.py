@@ -174,7 +174,7 @@ def test_options_check_themselves(options, message):
 
 
 def test_a_missing_python_library_is_named_with_its_cure():
-    with pytest.raises(MissingDependencyError, match="nowhere.*pip install matplotlib pyvista"):
+    with pytest.raises(MissingDependencyError, match=r"nowhere.*pip install matplotlib pyvista"):
         plotting.require("nowhere.to.be.found")
 
 

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
+from geounfold.backends.blas import one_thread
 from geounfold.mesh import Floats, Ints
 
 Solve = Callable[[Floats], Floats]
@@ -114,10 +115,12 @@ def banded_solver(band: Floats) -> Solve:
     numpy.linalg.LinAlgError
         The matrix is not positive definite.
     """
-    factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False)
+    with one_thread():
+        factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False)
 
     def solve(b: Floats) -> Floats:
-        out: Floats = cho_solve_banded((factor, True), b, check_finite=False)
+        with one_thread():
+            out: Floats = cho_solve_banded((factor, True), b, check_finite=False)
         return out
 
     return solve

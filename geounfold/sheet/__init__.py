@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from geounfold.flattening import SpringOptions
+from geounfold.flattening import flatten as flatten_surface
 from geounfold.geometry import vertex_sum
 from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
@@ -36,6 +38,9 @@ __all__ = [
     "SheetResult",
     "fit_body",
 ]
+
+
+_COARSE = SpringOptions(tol=1e-4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,20 +114,22 @@ def fit_body(
         No part of the top has a parallel bottom.
     """
 
-    def parameters(mesh: TriMesh, start: Floats | None) -> Floats:
-        return flatten(mesh, start).uv
-
-    medial = medial_sheet(split, parameters, options.medial)
+    medial = medial_sheet(split, _parameters, options.medial)
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)
     if exact:
         fitted, sharpened = fit_sheet(medial, samples, points, options.fit), ""
     else:
         fitted, sharpened = _fitted(medial, samples, points, steps, options)
-    fitted = conform(fitted, medial, parameters, options.conform)
+    fitted = conform(fitted, medial, _parameters, options.conform)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh, sharpened)
+
+
+def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
+    """Return near-isometric parameters of a surface, (n, 2): springs, not to the last digit."""
+    return flatten_surface(mesh, "spring", start=start, options=_COARSE).uv
 
 
 def _fitted(

@@ -25,7 +25,9 @@ Flatten = Callable[[TriMesh, Floats | None], Flattening]
 class ControlOptions:
     """Shape of the control mesh; lengths in blocks.
 
-    ``cell``: side of the footprint's cells; ``dilation``: rings of cells past the blocks;
+    ``cell``: side of the footprint's cells, and ``widest``, ``turn``, ``many``: on footprints of
+    more cells than ``many`` cells grow up to the widest while the surface turns by no more than
+    ``turn`` radians over one; ``dilation``: rings of cells past the blocks;
     ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
     where they vary; ``focal``: largest share of the focal distance; ``reach``: radius, in
     cells, of the filter on varying offsets; ``shrinks``: most steps of the repair;
@@ -33,6 +35,9 @@ class ControlOptions:
     """
 
     cell: float = 1.5
+    widest: float = 3.0
+    turn: float = 0.1
+    many: int = 8000
     dilation: int = 1
     pad: float = 0.6
     pad_capped: float = 1.0
@@ -226,6 +231,18 @@ def _climb(
     return layers, rung, shrinks, indices
 
 
+def _footprint(sheet: Sheet, U: Floats, options: ControlOptions) -> Footprint:
+    """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow."""
+    angle = principal_direction(sheet, U)
+    prints = footprint(U, angle, options.cell, options.dilation)
+    if len(prints.F) <= 2 * options.many:
+        return prints
+    k1, k2 = principal_curvatures(sheet.jet(prints.U))
+    bend = float(np.percentile(np.maximum(k1, -k2), 99))
+    cell = min(options.widest, options.turn / max(bend, 1e-9))
+    return footprint(U, angle, cell, options.dilation) if cell > options.cell else prints
+
+
 def build_control(
     fitted: FittedSheet,
     horizons: Horizons,
@@ -257,7 +274,7 @@ def build_control(
     """
     sheet = fitted.sheet
     foot = block_feet(fitted, points, reach=10.0)
-    prints = footprint(foot.U, principal_direction(sheet, foot.U), options.cell, options.dilation)
+    prints = _footprint(sheet, foot.U, options)
     k1, k2 = principal_curvatures(sheet.jet(prints.U))
     curvature = np.stack([k1, -k2])
     caps = _focal_caps(curvature, options.focal)

@@ -33,6 +33,9 @@ HALVINGS = 30
 #: Newton steps after which folded triangles end a run that has no barrier.
 PATIENCE = 12
 
+#: Residual of a Newton step's equations, as a share of their load: from fine to rough.
+RESIDUAL = (1e-5, 1e-2)
+
 #: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard where a vertex
 #: and its neighbours lie on one line.
 RIDGE = 1e-8
@@ -170,6 +173,7 @@ class _System:
         self._key = problem.edges[:, 0] * len(place) + problem.edges[:, 1]
         self._factors: spl.SuperLU | None = None
         self._far: int | None = None
+        self._first_load = 0.0
 
     def energy(self, uv: Floats) -> float:
         """Return the energy; infinite where the barrier is broken."""
@@ -190,8 +194,9 @@ class _System:
     def newton_step(self, uv: Floats, force: Floats, convex: bool) -> Floats | None:
         """Return the solution of ``H s = force``, (n, 2); None where H cannot be factored."""
         matrix, load = self._hessian(uv, convex), self._pattern.scatter(force)
+        self._first_load = self._first_load or float(np.linalg.norm(load))
         if self._factors is not None and not convex:
-            step = preconditioned_solve(matrix, load, self._factors.solve)
+            step = preconditioned_solve(matrix, load, self._factors.solve, self._accuracy(load))
             if step is not None:
                 return self._pattern.gather(step)
         try:
@@ -200,6 +205,15 @@ class _System:
             self._factors = None
             return None
         return self._pattern.gather(self._factors.solve(load))
+
+    def _accuracy(self, load: Floats) -> float:
+        """Return how accurately to solve for a step: roughly at first, finely as the forces fall.
+
+        A share of the load that falls with it keeps Newton's convergence quadratic (Dembo,
+        Eisenstat and Steihaug 1982).
+        """
+        share = float(np.linalg.norm(load)) / self._first_load
+        return min(max(share, RESIDUAL[0]), RESIDUAL[1])
 
     def _hessian(self, uv: Floats, convex: bool) -> sp.csc_array:
         """Return the second derivatives, the rigid motions held."""

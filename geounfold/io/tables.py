@@ -187,9 +187,7 @@ def _pyarrow() -> ModuleType:
     try:
         import pyarrow.parquet
     except ImportError as error:
-        raise MissingDependencyError(
-            "Parquet files need pyarrow: pip install pyarrow"
-        ) from error
+        raise MissingDependencyError("Parquet files need pyarrow: pip install pyarrow") from error
     module: ModuleType = pyarrow
     return module
 

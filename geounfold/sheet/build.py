@@ -144,14 +144,17 @@ class _FlatSheet:
 
 
 def _flatten_sheet(
-    nodes: _Nodes, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes, prints: Footprint, slip: Floats, reach: tuple[float, float], flatten: Flatten
 ) -> _FlatSheet:
-    """Flatten the mid surface and the parallel surfaces ``reach`` above and below it."""
+    """Flatten the mid surface and the parallel surfaces ``reach`` above and below it.
+
+    The fitted ``slip`` (n, 2) per height is the start of the latter two.
+    """
     P, normal = nodes.chord_points, nodes.chord_normal
     middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
-    above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid)
-    below = flatten(TriMesh(P - reach[1] * normal, prints.F), mid)
+    above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid - reach[0] * slip)
+    below = flatten(TriMesh(P - reach[1] * normal, prints.F), mid + reach[1] * slip)
     slopes = tuple(
         (register(f.uv, mid, prints.weight) - mid) / q
         for f, q in zip((above, below), reach, strict=True)
@@ -161,14 +164,15 @@ def _flatten_sheet(
 
 
 def _safely_flat(
-    nodes: _Nodes, prints: Footprint, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes, prints: Footprint, slip: Floats, reach: tuple[float, float], flatten: Flatten
 ) -> _FlatSheet:
     """Flatten at the full reach, or nearer to the mid surface where that would fold over.
 
     Slip is linear in height on a developable sheet, so nearer surfaces give the same slopes.
     """
     for share in (1.0, 0.6, 0.35, 0.2):
-        result = _flatten_sheet(nodes, prints, (share * reach[0], share * reach[1]), flatten)
+        near = (share * reach[0], share * reach[1])
+        result = _flatten_sheet(nodes, prints, slip, near, flatten)
         if not result.flips:
             break
     return result
@@ -283,7 +287,8 @@ def build_control(
     constant = not (caps < reach).any()
     safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
     nodes = _lifted_nodes(sheet, prints)
-    flat = _safely_flat(nodes, prints, (safe[0], safe[1]), flatten)
+    slip = sheet.grid.value(fitted.slip, prints.U)
+    flat = _safely_flat(nodes, prints, slip, (safe[0], safe[1]), flatten)
     follow = _offsets(prints, foot, caps, options)
     offsets = np.full_like(follow, reach) if constant else follow
     layers = Layers(
@@ -298,7 +303,6 @@ def build_control(
         offsets[1],
     )
     layers, rung, shrinks, indices = _climb(layers, follow, constant, points, options)
-    slip = sheet.grid.value(fitted.slip, prints.U)
     bottom, top = horizons.crossings(prints.U, slip, limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
     flat_datum = Datum(datum, means[0], means[1])

@@ -113,7 +113,6 @@ def fit_body(
     SplitError
         No part of the top has a parallel bottom.
     """
-
     medial = medial_sheet(split, _parameters, options.medial)
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)

@@ -155,7 +155,7 @@ def medial_sheet(
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * _graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
     medial = TriMesh(part.V - half[:, None] * inward, part.F)
-    uv = flatten(medial, flatten(part, None))
+    uv = flatten(medial, None)
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
     return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, core, at_vertices)

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold._version import __version__
+from geounfold.backends.blas import one_thread
 from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
 from geounfold.control import ControlMesh, scaled
 from geounfold.errors import ControlMeshError, InputError
@@ -52,6 +53,7 @@ class _Clock:
             self.seconds[name] = self.seconds.get(name, 0.0) + taken
 
 
+@one_thread()
 def unfold(
     points: Floats | pd.DataFrame,
     options: UnfoldOptions | None = None,

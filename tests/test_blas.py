@@ -1,4 +1,4 @@
-"""The linear algebra library's threads."""
+"""The linear algebra libraries' threads."""
 
 import pytest
 
@@ -7,20 +7,21 @@ from geounfold.backends import blas
 
 def test_one_thread_inside_and_as_many_as_before_afterwards():
     controls = blas._controls()
-    if controls is None:
-        pytest.skip("SciPy's linear algebra library is not OpenBLAS")
-    get, set_ = controls
-    before = get()
-    set_(2)
+    if not controls:
+        pytest.skip("neither NumPy nor SciPy uses OpenBLAS")
+    before = [get() for get, _ in controls]
+    for _, set_threads in controls:
+        set_threads(2)
     try:
         with blas.one_thread():
-            assert get() == 1
-        assert get() == 2
+            assert [get() for get, _ in controls] == [1] * len(controls)
+        assert [get() for get, _ in controls] == [2] * len(controls)
     finally:
-        set_(before)
+        for (_, set_threads), count in zip(controls, before, strict=True):
+            set_threads(count)
 
 
 def test_other_libraries_are_left_alone(monkeypatch):
-    monkeypatch.setattr(blas, "_controls", lambda: None)
+    monkeypatch.setattr(blas, "_controls", lambda: ())
     with blas.one_thread():
         pass

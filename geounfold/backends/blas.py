@@ -1,4 +1,4 @@
-"""The threads of the linear algebra library behind SciPy."""
+"""The threads of the linear algebra libraries behind NumPy and SciPy."""
 
 from __future__ import annotations
 
@@ -6,49 +6,50 @@ import ctypes
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 
-from scipy.linalg import lapack
+_USERS = ("numpy.linalg._umath_linalg", "scipy.linalg._flapack")
+"""Extension modules that need the library: its symbols are found through them."""
 
-_GETTERS_AND_SETTERS = tuple(
+_NAMES = tuple(
     (f"{prefix}openblas_get_num_threads{suffix}", f"{prefix}openblas_set_num_threads{suffix}")
     for prefix in ("scipy_", "")
-    for suffix in ("", "64_")
+    for suffix in ("64_", "")
 )
+
+Control = tuple[Callable[[], int], Callable[[int], object]]
 
 
 @cache
-def _controls() -> tuple[Callable[[], int], Callable[[int], None]] | None:
-    """Return OpenBLAS' functions that get and set its threads; None with another library."""
-    module = getattr(lapack, "_flapack", None)
-    path = getattr(module, "__file__", None)
-    if path is None:
-        return None
-    try:
-        library = ctypes.CDLL(path)  # its symbols include those of the libraries it needs
-    except OSError:
-        return None
-    for getter, setter in _GETTERS_AND_SETTERS:
-        if hasattr(library, getter) and hasattr(library, setter):
-            return getattr(library, getter), getattr(library, setter)
-    return None
+def _controls() -> tuple[Control, ...]:
+    """Return the functions that get and set the threads of each OpenBLAS that is loaded."""
+    found = []
+    for user in _USERS:
+        try:
+            library = ctypes.CDLL(str(import_module(user).__file__))
+        except (ImportError, OSError):  # another build: its threads are left alone
+            continue
+        for getter, setter in _NAMES:
+            if hasattr(library, getter) and hasattr(library, setter):
+                found.append((getattr(library, getter), getattr(library, setter)))
+                break
+    return tuple(found)
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Keep SciPy's OpenBLAS to one thread.
+    """Keep OpenBLAS to one thread, in the whole process.
 
-    Its threads wait for each other by spinning after every small block: the factorisation of a
-    band takes ten to a hundred times longer with two threads when another process has one of the
-    cores, and hardly less when none has.  With other libraries nothing is changed.
+    On narrow matrices its threads gain nothing, and they wait for each other by spinning: where
+    another process has one of two cores, factoring a band takes ten to a hundred times longer
+    with two threads.  Other libraries than OpenBLAS are left as they are.
     """
     controls = _controls()
-    if controls is None:
-        yield
-        return
-    get, set_ = controls
-    before = get()
-    set_(1)
+    before = [get() for get, _ in controls]
+    for _, set_threads in controls:
+        set_threads(1)
     try:
         yield
     finally:
-        set_(before)
+        for (_, set_threads), count in zip(controls, before, strict=True):
+            set_threads(count)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from geounfold.backends import meshlab
+from geounfold.backends.igl import boundary_loops
 from geounfold.hull._finish import HullOptions, compact, finish, largest_component
 from geounfold.hull._result import Hull
+from geounfold.hull.density import tie_break
 from geounfold.hull.shell import outer_shell
 from geounfold.mesh import Floats, Ints
 
-RADIUS = 1.2  # block sides: passes no gap of a lattice's surface, whose holes are 0.87 wide
+# Block sides: none passes a gap of a lattice's surface, whose holes are 0.87 wide.  Which one
+# closes it depends on ties among cospherical points; they are tried in this order.
+RADII = (1.2, 1.35, 1.05, 1.5)
 LONGEST_HOLE = 400  # edges of the longest border that is closed
 
 
@@ -53,10 +57,14 @@ def ball_pivoting_surface(points: Floats, normals: Floats) -> tuple[Floats, Ints
     points, normals : (n, 3) float
         Points on the outside of a body, block sides, and outward unit normals.
     """
-    V, F = meshlab.ball_pivoting(points, normals, RADIUS)
-    for _ in range(3):
-        V, F = meshlab.repair_manifold(V, F)
-        V, F = meshlab.orient_coherently(V, F)
-        V, F = meshlab.close_holes(V, F, LONGEST_HOLE)
-    V, F = compact(V, F[largest_component(F)])
+    shaken = points + tie_break(points)
+    for radius in RADII:
+        V, F = meshlab.ball_pivoting(shaken, normals, radius)
+        for _ in range(3):
+            V, F = meshlab.repair_manifold(V, F)
+            V, F = meshlab.orient_coherently(V, F)
+            V, F = meshlab.close_holes(V, F, LONGEST_HOLE)
+        V, F = compact(V, F[largest_component(F)])
+        if not boundary_loops(F):
+            break
     return V, np.ascontiguousarray(F)

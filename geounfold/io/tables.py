@@ -282,10 +282,15 @@ def _csv_text(frame: pd.DataFrame) -> str:
 
 def _fields(column: pd.Series) -> list[str]:
     """Return a column's values as CSV fields."""
-    values = objects(column).tolist()
+    if isinstance(column.dtype, np.dtype) and column.dtype == np.float64:
+        values = column.to_numpy()
+        fields = list(map(repr, values.tolist()))
+        for row in np.flatnonzero(np.isnan(values)):
+            fields[row] = ""
+        return fields
     if pd.api.types.is_float_dtype(column.dtype):
-        return ["" if v == "" else repr(v) for v in values]
-    return _quoted([str(v) for v in values])
+        return ["" if v == "" else repr(v) for v in objects(column).tolist()]
+    return _quoted([str(v) for v in objects(column).tolist()])
 
 
 def _quoted(fields: list[str]) -> list[str]:

@@ -22,8 +22,8 @@ from geounfold.mesh import Floats, Ints
 Solve = Callable[[Floats], Floats]
 
 _LARGEST_BAND = 60_000_000  # entries: half a gigabyte; beyond it, a sparse factorisation
-_SLAB = 16  # points of one cell that are multiplied at once
-_CHUNK = 65536  # points assembled at once: bounds the temporary memory
+_SLAB = 32  # points of one cell that are multiplied at once
+_CHUNK = 16384  # points assembled at once: their products stay in the cache
 
 
 @dataclass(frozen=True, eq=False)

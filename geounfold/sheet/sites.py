@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 
+from geounfold.geometry import sorted_distinct
 from geounfold.mesh import Bools, Floats, Ints
 
 
@@ -39,7 +40,7 @@ def surface_sites(cells: Ints, steps: Floats) -> Sites:
     low = cells.min(axis=0) - 1
     shape = cells.max(axis=0) - low + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = np.unique((cells - low) @ stride)  # sorted: shifted keys are looked up in order
+    keys = sorted_distinct((cells - low) @ stride)  # sorted: shifted keys are looked up in order
     open_ = np.zeros(len(keys), dtype=bool)
     empty = []
     for offset in product((-1, 0, 1), repeat=3):
@@ -50,7 +51,7 @@ def surface_sites(cells: Ints, steps: Floats) -> Sites:
         missing = keys[at] != wanted
         open_ |= missing
         empty.append(wanted[missing])
-    outside = np.unique(np.concatenate(empty))
+    outside = sorted_distinct(np.concatenate(empty))
     every = np.concatenate([keys[open_], outside])
     i, rest = np.divmod(every, stride[0])
     j, k = np.divmod(rest, stride[1])

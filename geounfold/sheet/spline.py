@@ -111,7 +111,7 @@ class SplineGrid:
 
     def _cells(self, U: Floats) -> tuple[Ints, Floats]:
         q = (U - self.origin) / self.step
-        i = np.clip(np.floor(q).astype(np.int64), 1, np.array(self.shape) - 3)
+        i = np.clip(q.astype(np.int64), 1, np.array(self.shape) - 3)
         return i, q - i
 
     def basis(self, U: Floats, du: int = 0, dv: int = 0) -> sp.csr_array:

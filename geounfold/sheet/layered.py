@@ -37,7 +37,7 @@ class LayerOptions:
     rounds: int = 4
     smooth: tuple[float, ...] = (1.0, 1.6, 2.4, 3.2)
     smooth_half: float = 2.0
-    most: int = 100_000
+    most: int = 12_000
 
 
 def scatter(points: Floats) -> Floats:

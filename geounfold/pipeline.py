@@ -16,6 +16,7 @@ import pandas as pd
 
 from geounfold._version import __version__
 from geounfold.backends.blas import one_thread
+from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
 from geounfold.control import ControlMesh, scaled
 from geounfold.errors import ControlMeshError, InputError
@@ -420,8 +421,8 @@ class Unfolding:
             "faces": len(hull.mesh.F),
             "volume": enclosed_volume(hull.mesh.V, hull.mesh.F) * cube,
             "blocks_volume": hull.blocks_volume * cube,
-            "closed": True,
-            "manifold": True,
+            "closed": not boundary_loops(hull.mesh.F),
+            "manifold": is_manifold(hull.mesh.F),
             "dropped_faces": hull.dropped,
         }
 

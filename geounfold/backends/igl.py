@@ -6,7 +6,7 @@ import igl
 import numpy as np
 
 from geounfold.errors import BackendError
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.mesh import Floats, Ints
 
 
 def _f(a: Floats) -> Floats:
@@ -107,31 +107,6 @@ def is_manifold(F: Ints) -> bool:
     return edge_ok and bool(np.all(vertex[0] if isinstance(vertex, tuple) else vertex))
 
 
-def marching_cubes(
-    field: Floats, origin: Floats, step: Floats, level: float
-) -> tuple[Floats, Ints]:
-    """Return the level surface of a regular grid as (V, F), outward where the field falls.
-
-    Parameters
-    ----------
-    field : (nx, ny, nz) float
-        Values at the grid's nodes; below ``level`` on the grid's border.
-    origin, step : (3,) float
-        Position of node (0, 0, 0) and node spacing per axis.
-    level : float
-        Value on the surface.
-    """
-    nx, ny, nz = field.shape
-    axes = [origin[k] + step[k] * np.arange(n) for k, n in enumerate(field.shape)]
-    grid = np.empty((nz, ny, nx, 3))
-    grid[..., 0] = axes[0]
-    grid[..., 1] = axes[1][:, None]
-    grid[..., 2] = axes[2][:, None, None]
-    values = np.ascontiguousarray(field.transpose(2, 1, 0)).ravel().astype(np.float64)
-    V, F = igl.marching_cubes(values, grid.reshape(-1, 3), nx, ny, nz, level)[:2]
-    return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
-
-
 def marching_cubes_sparse(
     field: Floats, nodes: Floats, cubes: Ints, level: float
 ) -> tuple[Floats, Ints]:
@@ -150,14 +125,6 @@ def marching_cubes_sparse(
     """
     V, F = igl.marching_cubes(_f(field), _f(nodes), _i(cubes), float(level))[:2]
     return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
-
-
-def border_vertices(F: Ints, n: int) -> Bools:
-    """Return which of n vertices lie on the mesh's border, (n,)."""
-    out = np.zeros(n, dtype=bool)
-    for loop in boundary_loops(F):
-        out[loop] = True
-    return out
 
 
 def pinched_vertices(F: Ints) -> Ints:

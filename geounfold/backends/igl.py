@@ -107,6 +107,31 @@ def is_manifold(F: Ints) -> bool:
     return edge_ok and bool(np.all(vertex[0] if isinstance(vertex, tuple) else vertex))
 
 
+def marching_cubes(
+    field: Floats, origin: Floats, step: Floats, level: float
+) -> tuple[Floats, Ints]:
+    """Return the level surface of a regular grid as (V, F), outward where the field falls.
+
+    Parameters
+    ----------
+    field : (nx, ny, nz) float
+        Values at the grid's nodes; below ``level`` on the grid's border.
+    origin, step : (3,) float
+        Position of node (0, 0, 0) and node spacing per axis.
+    level : float
+        Value on the surface.
+    """
+    nx, ny, nz = field.shape
+    axes = [origin[k] + step[k] * np.arange(n) for k, n in enumerate(field.shape)]
+    grid = np.empty((nz, ny, nx, 3))
+    grid[..., 0] = axes[0]
+    grid[..., 1] = axes[1][:, None]
+    grid[..., 2] = axes[2][:, None, None]
+    values = np.ascontiguousarray(field.transpose(2, 1, 0)).ravel().astype(np.float64)
+    V, F = igl.marching_cubes(values, grid.reshape(-1, 3), nx, ny, nz, level)[:2]
+    return np.asarray(V), np.asarray(F[:, ::-1], dtype=np.int64).copy()
+
+
 def marching_cubes_sparse(
     field: Floats, nodes: Floats, cubes: Ints, level: float
 ) -> tuple[Floats, Ints]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,10 +14,8 @@ from geounfold.backends.igl import SurfaceIndex, TetIndex
 from geounfold.control import ControlMesh
 from geounfold.errors import InputError
 from geounfold.frame import Frame
+from geounfold.mapfile import read_arrays, write_arrays
 from geounfold.mesh import Bools, Floats, Ints, TetMesh
-
-FORMAT = "geounfold-map"
-FORMAT_VERSION = 1
 
 TURNED_OVER = np.array([1.0, -1.0, -1.0])
 """Half a turn about the flat space's x axis: what exchanges top and bottom."""
@@ -181,34 +177,20 @@ class UnfoldingMap:
 
     def save(self, path: str | Path | BinaryIO) -> None:
         """Write the map as .npz without pickles: control mesh, frame, version, checksum."""
-        arrays = self._arrays()
-        digest = np.array(_checksum(arrays))
-        np.savez_compressed(path, **arrays, checksum=digest)  # type: ignore[arg-type]
+        write_arrays(path, self._arrays())
 
     def _arrays(self) -> dict[str, np.ndarray]:
         frame, control = self.frame, self.control
-        steps = np.full(3, np.nan) if frame.steps is None else frame.steps
         return {
-            "format": np.array(FORMAT),
-            "version": np.array(FORMAT_VERSION),
             "origin": frame.origin,
             "rotation": frame.rotation,
             "scale": np.array(frame.scale),
-            "steps": steps,
+            "steps": np.full(3, np.nan) if frame.steps is None else frame.steps,
             "folded": control.folded.V,
             "unfolded": control.unfolded.V,
-            "tetrahedra": control.folded.T.astype(np.int32),
+            "tetrahedra": control.folded.T,
             "stratigraphic": control.stratigraphic,
         }
-
-
-def _checksum(arrays: dict[str, np.ndarray]) -> str:
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        digest.update(name.encode())
-        digest.update(str(arrays[name].dtype).encode())
-        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
-    return digest.hexdigest()
 
 
 def checked_points(points: Floats) -> Floats:
@@ -230,10 +212,7 @@ def load(path: str | Path) -> UnfoldingMap:
     InputError
         No such file, not a map, of a later version, or damaged.
     """
-    arrays = _read_arrays(Path(path))
-    stored = arrays.pop("checksum")
-    if str(stored) != _checksum(arrays):
-        raise InputError(f"{path}: the map file is damaged (checksum differs); save it again")
+    arrays = read_arrays(path)
     steps = arrays["steps"]
     frame = Frame(
         arrays["origin"],
@@ -246,22 +225,3 @@ def load(path: str | Path) -> UnfoldingMap:
         TetMesh(arrays["folded"], T), TetMesh(arrays["unfolded"], T), arrays["stratigraphic"]
     )
     return UnfoldingMap(frame, control)
-
-
-def _read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a map file after checking that it is one."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such map file; write one with geounfold unfold --map")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zipfile.error) as err:
-        raise InputError(f"{path}: not a geounfold map, or a damaged one; save it again") from err
-    if str(arrays.get("format")) != FORMAT or "checksum" not in arrays:
-        raise InputError(f"{path}: not a geounfold map; write one with geounfold unfold --map")
-    if int(arrays["version"]) > FORMAT_VERSION:
-        raise InputError(
-            f"{path}: map version {int(arrays['version'])} is newer than this geounfold reads "
-            f"({FORMAT_VERSION}); upgrade geounfold"
-        )
-    return arrays

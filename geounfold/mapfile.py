@@ -1,0 +1,338 @@
+"""The file that keeps a map: named arrays in a zip archive, checked before they are believed.
+
+The archive holds one .npy member for each entry of ARRAYS, the format's name and version, and
+a checksum over all of them. ``numpy.load`` opens it too, but it is read here member by member:
+the sizes in the archive's directory are looked at before anything is unpacked, a member's header
+is matched against the one form that numpy writes, and numbers are taken from bytes as they are.
+Nothing in the file is evaluated, unpickled or unpacked onto the disk.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import os
+import re
+import shutil
+import struct
+import uuid
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geounfold.errors import InputError
+
+FORMAT = "geounfold-map"
+FORMAT_VERSION = 1
+
+Arrays = dict[str, NDArray[Any]]
+
+_FLOAT, _INDEX = "<f8", "<i4"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What an array of a map file has to be.
+
+    Attributes
+    ----------
+    dtype : str
+        Its type, byte order included.
+    shape : tuple of int or str
+        Its shape; a word is a length that all arrays naming it share, and 1 or more.
+    below : str, optional
+        For indices: the word for the length that they must stay below; 0 or more.
+    finite : bool, optional
+        Whether every number must be finite.
+    holds : callable, optional
+        Returns whether the array is what `must` says.
+    must : str, optional
+        Completes "must ...".
+    """
+
+    dtype: str
+    shape: tuple[int | str, ...]
+    below: str | None = None
+    finite: bool = True
+    holds: Callable[[NDArray[Any]], bool] | None = None
+    must: str = ""
+
+
+def _is_rotation(matrix: NDArray[Any]) -> bool:
+    # A rotation made of doubles is off by 1e-15; one off by 1e-9 still carries to 1e-9 of the size.
+    with np.errstate(all="ignore"):
+        off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+        return bool(off < 1e-9 and np.linalg.det(matrix) > 0)
+
+
+def _is_steps(steps: NDArray[Any]) -> bool:
+    return bool(np.isnan(steps).all() or (np.isfinite(steps) & (steps > 0)).all())
+
+
+ARRAYS: Mapping[str, Layout] = {
+    "origin": Layout(_FLOAT, (3,)),
+    "rotation": Layout(_FLOAT, (3, 3), holds=_is_rotation, must="be a rotation"),
+    "scale": Layout(_FLOAT, (), holds=lambda a: bool(a > 0), must="be positive"),
+    "steps": Layout(
+        _FLOAT, (3,), finite=False, holds=_is_steps, must="be positive, or all missing"
+    ),
+    "folded": Layout(_FLOAT, ("vertices", 3)),
+    "unfolded": Layout(_FLOAT, ("vertices", 3)),
+    "tetrahedra": Layout(_INDEX, ("tetrahedra", 4), below="vertices"),
+    "stratigraphic": Layout(_FLOAT, ("vertices",)),
+}
+"""Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
+
+_HEAD: Mapping[str, Layout] = {
+    "format": Layout(f"<U{len(FORMAT)}", ()),
+    "version": Layout("<i8", ()),
+    "checksum": Layout("<U64", ()),
+}
+_NPY = re.compile(
+    rb"\x93NUMPY\x01\x00(?s:..)"  # version 1.0, length of what follows
+    rb"\{'descr': '([<|][A-Za-z]\d{1,4})', 'fortran_order': False, "
+    rb"'shape': \(((?:\d{1,12}(?:, \d{1,12})*)?),?\), \} *\n"
+)
+_LONGEST_HEAD = 4096
+_ROOM = 64 << 20  # bytes that any file may unpack to
+_RATIO = 100  # ... and how often its own size where it is larger; maps measured: 1.5 to 8
+_LARGEST = 4 << 30
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_DAMAGE = (
+    *(OSError, ValueError, EOFError, KeyError, IndexError, OverflowError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+
+
+def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write the arrays of a map; the same arrays give the same bytes.
+
+    A file appears at `path` whole or not at all. As with ``numpy.savez``, ``.npz`` is added to
+    a name that lacks it.
+
+    Parameters
+    ----------
+    path : path or binary stream
+        Where to.
+    arrays : dict of arrays
+        Those of ARRAYS, of any type that converts without loss.
+
+    Raises
+    ------
+    InputError
+        An array is missing, unknown, or not what ARRAYS says.
+    """
+    exact = {
+        name: np.ascontiguousarray(arrays[name], layout.dtype).reshape(np.shape(arrays[name]))
+        for name, layout in ARRAYS.items()
+        if name in arrays
+    }
+    _check_names({*arrays}, {*ARRAYS}, "the map")
+    _check_arrays(exact, "the map")
+    whole = {"format": np.array(FORMAT), "version": np.array(FORMAT_VERSION, "<i8"), **exact}
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **whole, checksum=np.array(_checksum(whole)))  # type: ignore[arg-type]
+    if isinstance(path, str | os.PathLike):
+        name = os.fspath(path)
+        _write_whole(Path(name if name.endswith(".npz") else f"{name}.npz"), stream.getvalue())
+    else:
+        path.write(stream.getvalue())
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Write a file beside its place and move it there."""
+    target = path.resolve()
+    part = target.with_name(f".geounfold-{uuid.uuid4().hex}.part")
+    try:
+        with part.open("xb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        if target.exists():
+            shutil.copymode(target, part)
+        os.replace(part, target)  # noqa: PTH105
+    except BaseException:
+        with suppress(OSError):
+            part.unlink()
+        raise
+
+
+def read_arrays(path: str | Path) -> Arrays:
+    """Return the arrays of a map file, those of ARRAYS, after checking all of it.
+
+    Raises
+    ------
+    InputError
+        No such file, one that cannot be read, not a map, of another version, damaged, or with
+        arrays that are no map's.
+    """
+    path = Path(path)
+    content = _content(path)
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = _members(archive, len(content), path)
+            head = {n: _array(archive, members, n, path) for n in ("format", "version")}
+            _check_version(head, path)
+            _check_names({*members}, {f"{n}.npy" for n in (*_HEAD, *ARRAYS)}, str(path))
+            rest = {n: _array(archive, members, n, path) for n in ("checksum", *ARRAYS)}
+    except _DAMAGE as error:
+        raise InputError(f"{path}: not a geounfold map, or a damaged one; save it again") from error
+    stored = rest.pop("checksum")
+    if str(stored) != _checksum({**head, **rest}):
+        raise InputError(f"{path}: the map file is damaged (checksum differs); save it again")
+    _check_arrays(rest, str(path))
+    return rest
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a regular file of a sane size."""
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a directory, not a map file")
+        if not path.exists():
+            raise InputError(f"{path}: no such map file; write one with geounfold unfold --map")
+        if not path.is_file():
+            raise InputError(f"{path}: is not a regular file (a pipe or device?)")
+        with path.open("rb") as stream:
+            if os.fstat(stream.fileno()).st_size > _LARGEST:
+                raise InputError(
+                    f"{path}: not a geounfold map: larger than any ({_size(_LARGEST)})"
+                )
+            return stream.read(_LARGEST)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _members(archive: zipfile.ZipFile, size: int, path: Path) -> dict[str, zipfile.ZipInfo]:
+    """Return the members by name, after a look at the directory alone."""
+    members: dict[str, zipfile.ZipInfo] = {}
+    for info in archive.infolist():
+        if info.filename in members:
+            raise InputError(f"{path}: not a geounfold map: two of '{_shown(info.filename)}'")
+        if info.compress_type not in _METHODS or info.flag_bits & 1:
+            raise InputError(
+                f"{path}: not a geounfold map: '{_shown(info.filename)}' is encrypted, or packed "
+                "in a way that no map is"
+            )
+        members[info.filename] = info
+    total = sum(info.file_size for info in members.values())
+    if total > min(_LARGEST, max(_ROOM, _RATIO * size)):
+        raise InputError(
+            f"{path}: not a geounfold map: {_size(size)} that would unpack to {_size(total)}"
+        )
+    return members
+
+
+def _array(
+    archive: zipfile.ZipFile, members: Mapping[str, zipfile.ZipInfo], name: str, path: Path
+) -> NDArray[Any]:
+    """Return one array, of the type its layout asks for and the shape its header tells."""
+    if f"{name}.npy" not in members:
+        raise _foreign(path)
+    dtype = np.dtype({**_HEAD, **ARRAYS}[name].dtype)
+    content = archive.read(members[f"{name}.npy"])
+    header = _NPY.match(content[:_LONGEST_HEAD])
+    found = header and header.group(1).decode("ascii")
+    if header is None or found != dtype.str:
+        if name in ("format", "version"):
+            raise _foreign(path)
+        raise InputError(
+            f"{path}: array '{name}' of the map must be {dtype.str}, "
+            f"but is {found or 'something else'}; save it again"
+        )
+    shape = tuple(int(word) for word in header.group(2).decode("ascii").split(",") if word)
+    body = content[header.end() :]
+    if len(body) != math.prod(shape) * dtype.itemsize:
+        raise InputError(f"{path}: the map file is damaged (array '{name}' is cut); save it again")
+    return np.frombuffer(body, dtype).reshape(shape)
+
+
+def _check_version(head: Arrays, path: Path) -> None:
+    """Raise where the file is no map, or one of another version."""
+    if any(a.shape != () for a in head.values()) or str(head["format"]) != FORMAT:
+        raise _foreign(path)
+    version = int(head["version"])
+    if version > FORMAT_VERSION:
+        raise InputError(
+            f"{path}: map version {version} is newer than this geounfold reads "
+            f"({FORMAT_VERSION}); upgrade geounfold"
+        )
+    if version < FORMAT_VERSION:
+        raise InputError(
+            f"{path}: map version {version} is older than this geounfold reads "
+            f"({FORMAT_VERSION}); unfold again with --map"
+        )
+
+
+def _check_names(found: set[str], wanted: set[str], source: str) -> None:
+    """Raise where arrays are missing, or ones are there that no map has."""
+    for names, what in ((wanted - found, "lacks"), (found - wanted, "holds more than a map:")):
+        if names:
+            some = ", ".join(_shown(name) for name in sorted(names)[:3])
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            raise InputError(f"{source}: not a geounfold map: it {what} {some}{more}")
+
+
+def _check_arrays(arrays: Arrays, source: str) -> None:
+    """Raise where an array is not what its layout says, or does not fit the others."""
+    lengths: dict[str, int] = {}
+    for name, layout in ARRAYS.items():
+        shape = arrays[name].shape
+        fits = len(shape) == len(layout.shape) and all(
+            n == (lengths.setdefault(want, n) if isinstance(want, str) else want)
+            and (n > 0 or not isinstance(want, str))
+            for n, want in zip(shape, layout.shape, strict=True)
+        )
+        if not fits:
+            words = ", ".join(str(lengths.get(str(w), w)) for w in layout.shape)
+            raise _wrong(source, name, f"have shape ({words}), but has {shape}")
+    for name, layout in ARRAYS.items():
+        values = arrays[name]
+        if layout.finite and not np.isfinite(values).all():
+            raise _wrong(source, name, "be finite")
+        if layout.below is not None and not (
+            values.min() >= 0 and values.max() < lengths[layout.below]
+        ):
+            raise _wrong(
+                source,
+                name,
+                f"lie within 0..{lengths[layout.below] - 1}, but reaches "
+                f"{values.min()}..{values.max()}",
+            )
+        if layout.holds is not None and not layout.holds(values):
+            raise _wrong(source, name, layout.must)
+
+
+def _wrong(source: str, name: str, must: str) -> InputError:
+    return InputError(f"{source}: array '{name}' of the map must {must}")
+
+
+def _foreign(path: Path) -> InputError:
+    return InputError(f"{path}: not a geounfold map; write one with geounfold unfold --map")
+
+
+def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the SHA-256 over names, types and bytes of arrays, in the names' order."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        digest.update(name.encode())
+        digest.update(str(arrays[name].dtype).encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()
+
+
+def _shown(name: str) -> str:
+    text = "".join(c if c.isprintable() else "?" for c in name)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.3g} MB"

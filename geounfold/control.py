@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from geounfold.errors import OptionError
 from geounfold.geometry import tet_volumes
-from geounfold.mesh import Floats, TetMesh
+from geounfold.mesh import Floats, Ints, TetMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +81,49 @@ class Datum:
         if self.name == "proportional":
             return ((height - bottom) / (top - bottom) - 0.5) * (self.top - self.bottom)
         return height
+
+
+def side_by_side(
+    parts: Sequence[tuple[ControlMesh, ControlMesh | None]], gap: float = 10.0
+) -> tuple[ControlMesh, ControlMesh | None]:
+    """Return several control meshes, with their shells, as one: side by side along unfolded x.
+
+    Parameters
+    ----------
+    parts : sequence of (ControlMesh, ControlMesh or None)
+        Each with its shell, whose first vertices are the control mesh's.
+    gap : float
+        Distance left between them.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    wholes = [control if shell is None else shell for control, shell in parts]
+    inner = [len(control.folded.V) for control, _ in parts]
+    extra = [len(whole.folded.V) - n for whole, n in zip(wholes, inner, strict=True)]
+    starts = np.concatenate([[0], np.cumsum(inner)])
+    further = starts[-1] + np.concatenate([[0], np.cumsum(extra)])
+    edge, columns, tets, shells = 0.0, [], [], []
+    for k, (control, shell) in enumerate(parts):
+        whole, n = wholes[k], inner[k]
+        V = whole.unfolded.V
+        moved = V + np.array([edge - float(V[:, 0].min()), 0.0, 0.0])
+        edge += float(np.ptp(V[:, 0])) + gap
+        columns.append(np.column_stack([whole.folded.V, moved, whole.stratigraphic]))
+        number = np.arange(len(V)) + np.where(np.arange(len(V)) < n, starts[k], further[k] - n)
+        tets.append(number[control.folded.T])
+        if shell is not None:
+            shells.append(number[shell.folded.T])
+    table = np.concatenate([c[:n] for c, n in zip(columns, inner, strict=True)])
+    joined = _from_table(table, np.concatenate(tets))
+    if not shells:
+        return joined, None
+    rest = [c[n:] for c, n in zip(columns, inner, strict=True)]
+    return joined, _from_table(np.concatenate([table, *rest]), np.concatenate(shells))
+
+
+def _from_table(table: Floats, T: Ints) -> ControlMesh:
+    """Return a control mesh from rows of folded and unfolded places and the third coordinate."""
+    return ControlMesh(TetMesh(table[:, :3], T), TetMesh(table[:, 3:6], T), table[:, 6])
 
 
 def scaled(control: ControlMesh, folded: Floats, factor: float) -> ControlMesh:

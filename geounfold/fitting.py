@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from geounfold.control import ControlMesh
-from geounfold.errors import ControlMeshError, OptionError
+from geounfold.errors import OptionError
 from geounfold.flattening import Flattening, flatten
 from geounfold.frame import Frame
-from geounfold.geometry import face_normals, tet_volumes, triangle_areas
+from geounfold.geometry import face_normals, triangle_areas
 from geounfold.hull import Hull, extract_hull
 from geounfold.mesh import Floats, TriMesh
 from geounfold.options import UnfoldOptions
@@ -49,6 +49,8 @@ class BodyFit:
         The hull's faces as top, bottom and rim.
     control : ControlMesh
         Tetrahedra in both spaces; unfolded z up is the top side.
+    shell : ControlMesh or None
+        Tetrahedra around them, for points outside; over the control mesh's vertices and others.
     surfaces : dict of SurfacePair
         ``top``, ``bottom`` and, for the sheet method, ``mid``.
     flattenings : dict of Flattening
@@ -62,6 +64,7 @@ class BodyFit:
     hull: Hull | None
     split: SurfaceSplit
     control: ControlMesh
+    shell: ControlMesh | None
     surfaces: dict[str, SurfacePair]
     flattenings: dict[str, Flattening]
     sheet: SheetResult | None
@@ -94,8 +97,6 @@ def fit(
     ------
     HullError, NoSheetError, SplitError, FlatteningError
         As the stages do.
-    ControlMeshError
-        Tetrahedra are inverted, and ``allow_uncertified`` is off.
     """
     hull = None
     if reference is None:
@@ -117,7 +118,6 @@ def fit(
         result = _fit_sheet(points, frame, hull, parts, options, datum, stage)
     if over:
         result = _turned_over(result)
-    _check_upright(result.control, frame, options)
     return result
 
 
@@ -149,7 +149,10 @@ def _fit_sheet(
             variance,
             inset,
             _flattener(options),
-            options.sheet_options,
+            replace(
+                options.sheet_options,
+                control=replace(options.sheet_options.control, shell=options.reach),
+            ),
             datum,
             exact=hull is None,
         )
@@ -159,15 +162,15 @@ def _fit_sheet(
         for name, (folded, unfolded) in mesh.surfaces.items()
     }
     notes = {
-        "rung": mesh.rung,
-        "shrinks": mesh.shrinks,
+        "rung": mesh.rungs[-1].name,
+        "rungs": [asdict(rung) for rung in mesh.rungs],
         "roughness": result.fitted.roughness,
         "smoothing": result.fitted.smoothing,
         "accepted_samples": result.fitted.accepted,
         "sharpened": result.sharpened,
         "layers_follow": {0.0: "mid", 1.0: "top", -1.0: "bottom"}[result.fitted.lean],
     }
-    return BodyFit(hull, parts, mesh.control, surfaces, mesh.flattenings, result, notes)
+    return BodyFit(hull, parts, mesh.control, mesh.shell, surfaces, mesh.flattenings, result, notes)
 
 
 def _fit_thesis(
@@ -193,7 +196,7 @@ def _fit_thesis(
         name: getattr(mesh, name)
         for name in ("thickness", "bottom_missed", "top_missed", "extended", "squeezed", "steep")
     }
-    return BodyFit(hull, parts, mesh.control, surfaces, flattenings, None, notes)
+    return BodyFit(hull, parts, mesh.control, None, surfaces, flattenings, None, notes)
 
 
 def _level(mesh: TriMesh, uv: Floats, z: float) -> TriMesh:
@@ -224,13 +227,17 @@ def _over(V: Floats) -> Floats:
     return out
 
 
+def _over_control(control: ControlMesh) -> ControlMesh:
+    return ControlMesh(
+        control.folded,
+        control.unfolded.with_vertices(_over(control.unfolded.V)),
+        1 - control.stratigraphic,
+    )
+
+
 def _turned_over(result: BodyFit) -> BodyFit:
     """Return the fit with top and bottom exchanged: the flat space turned about its x axis."""
-    control = ControlMesh(
-        result.control.folded,
-        result.control.unfolded.with_vertices(_over(result.control.unfolded.V)),
-        1 - result.control.stratigraphic,
-    )
+    shell = None if result.shell is None else _over_control(result.shell)
     surfaces = {
         _OTHER_SIDE.get(name, name): SurfacePair(
             pair.folded, pair.unfolded.with_vertices(_over(pair.unfolded.V)), pair.flattening
@@ -252,21 +259,13 @@ def _turned_over(result: BodyFit) -> BodyFit:
         parts.adjacency,
         not parts.flipped_up,
     )
-    return BodyFit(result.hull, turned, control, surfaces, flattenings, result.sheet, notes)
-
-
-def _check_upright(control: ControlMesh, frame: Frame, options: UnfoldOptions) -> None:
-    """Raise ControlMeshError where tetrahedra are inverted, unless that is allowed."""
-    folded = tet_volumes(control.folded.V, control.folded.T) <= 0
-    unfolded = tet_volumes(control.unfolded.V, control.unfolded.T) <= 0
-    bad = folded | unfolded
-    if options.allow_uncertified or not bad.any():
-        return
-    place = frame.to_world(control.folded.V[control.folded.T[bad]].mean(axis=(0, 1))[None])[0]
-    where = ", ".join(f"{c:.6g}" for c in place)
-    raise ControlMeshError(
-        f"{int(bad.sum())} of {len(bad)} control tetrahedra are inverted "
-        f"({int(folded.sum())} folded, {int(unfolded.sum())} unfolded), around ({where}); "
-        "the fold is too tight there for this block size: try another --hull or --flattener, "
-        "or --allow-uncertified to write the answer all the same"
+    return BodyFit(
+        result.hull,
+        turned,
+        _over_control(result.control),
+        shell,
+        surfaces,
+        flattenings,
+        result.sheet,
+        notes,
     )

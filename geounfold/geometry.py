@@ -111,3 +111,44 @@ def tet_volumes(V: Floats, T: Ints) -> Floats:
         np.einsum("ij,ij->i", V[T[:, 1]] - a, np.cross(V[T[:, 2]] - a, V[T[:, 3]] - a)) / 6
     )
     return out
+
+
+def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return the faces that belong to one tetrahedron only, and their tetrahedra.
+
+    Parameters
+    ----------
+    T : (m, 4) int
+        Tetrahedra, right-handed where upright.
+
+    Returns
+    -------
+    F : (b, 3) int
+        Boundary faces, seen counter-clockwise from outside upright tetrahedra.
+    owner : (b,) int
+        Tetrahedron of each.
+    misglued : (k,) int
+        Tetrahedra at faces that more than two share, or that two share from the same side.
+
+    Examples
+    --------
+    >>> F, owner, misglued = boundary_faces(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))
+    >>> len(F), owner.tolist(), misglued.tolist()
+    (6, [0, 0, 0, 1, 1, 1], [])
+    """
+    corners = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    F = T[:, corners].reshape(-1, 3)
+    low, high = F.min(axis=1), F.max(axis=1)
+    middle = F.sum(axis=1) - low - high
+    order = np.lexsort((high, middle, low))
+    keys = np.stack([low, middle, high], axis=1)[order]
+    fresh = np.ones(len(F), dtype=bool)
+    fresh[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    group = np.cumsum(fresh) - 1
+    count = np.bincount(group)
+    follows_low = F[np.arange(len(F)), (F.argmin(axis=1) + 1) % 3]
+    side = np.where(follows_low == middle, 1, -1)[order]
+    sound = (count == 1) | ((count == 2) & (np.bincount(group, weights=side) == 0))
+    once = order[count[group] == 1]
+    once.sort()
+    return F[once], once // 4, np.unique(order[~sound[group]] // 4)

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -47,7 +47,8 @@ class Layout:
     dtype : str
         Its type, byte order included.
     shape : tuple of int or str
-        Its shape; a word is a length that all arrays naming it share, and 1 or more.
+        Its shape; a word is a length that all arrays naming it share, and 1 or more, or 0 too
+        where it ends in a question mark.
     below : str, optional
         For indices: the word for the length that they must stay below; 0 or more.
     finite : bool, optional
@@ -84,9 +85,12 @@ ARRAYS: Mapping[str, Layout] = {
     "steps": Layout(
         _FLOAT, (3,), finite=False, holds=_is_steps, must="be positive, or all missing"
     ),
+    "reach": Layout(_FLOAT, (), holds=lambda a: bool(a >= 0), must="not be negative"),
     "folded": Layout(_FLOAT, ("vertices", 3)),
     "unfolded": Layout(_FLOAT, ("vertices", 3)),
+    "inner": Layout(_INDEX, (), holds=lambda a: bool(a > 0), must="be positive"),
     "tetrahedra": Layout(_INDEX, ("tetrahedra", 4), below="vertices"),
+    "shell": Layout(_INDEX, ("shell?", 4), below="vertices"),
     "stratigraphic": Layout(_FLOAT, ("vertices",)),
 }
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
@@ -288,7 +292,7 @@ def _check_arrays(arrays: Arrays, source: str) -> None:
         shape = arrays[name].shape
         fits = len(shape) == len(layout.shape) and all(
             n == (lengths.setdefault(want, n) if isinstance(want, str) else want)
-            and (n > 0 or not isinstance(want, str))
+            and (n > 0 or not isinstance(want, str) or want.endswith("?"))
             for n, want in zip(shape, layout.shape, strict=True)
         )
         if not fits:
@@ -298,8 +302,10 @@ def _check_arrays(arrays: Arrays, source: str) -> None:
         values = arrays[name]
         if layout.finite and not np.isfinite(values).all():
             raise _wrong(source, name, "be finite")
-        if layout.below is not None and not (
-            values.min() >= 0 and values.max() < lengths[layout.below]
+        if (
+            layout.below is not None
+            and values.size
+            and not (values.min() >= 0 and values.max() < lengths[layout.below])
         ):
             raise _wrong(
                 source,

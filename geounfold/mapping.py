@@ -10,35 +10,21 @@ from typing import BinaryIO
 
 import numpy as np
 
-from geounfold.backends.igl import SurfaceIndex, TetIndex
+from geounfold.backends.igl import SurfaceIndex, TetIndex, barycentric_in_tets
 from geounfold.control import ControlMesh
 from geounfold.errors import InputError
 from geounfold.frame import Frame
+from geounfold.geometry import boundary_faces
 from geounfold.mapfile import read_arrays, write_arrays
 from geounfold.mesh import Bools, Floats, Ints, TetMesh
 
-TURNED_OVER = np.array([1.0, -1.0, -1.0])
-"""Half a turn about the flat space's x axis: what exchanges top and bottom."""
+INSIDE, EXTRAPOLATED, OUTSIDE = "inside", "extrapolated", "outside"
 
-INSIDE, EXTRAPOLATED = "inside", "extrapolated"
+REACH = 3.0
+"""How far past the control mesh points are carried, in blocks, where nothing else is asked for."""
 
-
-def boundary_faces(T: Ints) -> tuple[Ints, Ints]:
-    """Return the faces that belong to one tetrahedron only, outward, and their tetrahedra.
-
-    Examples
-    --------
-    >>> faces, owner = boundary_faces(np.array([[0, 1, 2, 3]]))
-    >>> len(faces), owner.tolist()
-    (4, [0, 0, 0, 0])
-    """
-    corners = ([0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2])
-    F = np.concatenate([T[:, c] for c in corners])
-    owner = np.tile(np.arange(len(T)), 4)
-    key = np.sort(F, axis=1)
-    _, index, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    once = count[index.ravel()] == 1
-    return F[once], owner[once]
+TOUCHING = 1e-9
+"""A point this near to a mesh, as a share of the mesh's size, lies in it: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,70 +34,132 @@ class Carried:
     Attributes
     ----------
     points : (n, 3) float
-        Their images.
+        Their images; NaN where the point lies beyond the map's reach.
     stratigraphic : (n,) float
-        0 at the bottom surface, 1 at the top.
+        0 at the bottom surface, 1 at the top; NaN where there is no image.
     inside : (n,) bool
-        False where the point lies outside the control mesh and was extrapolated.
+        Whether the control mesh holds the point.
+    placed : (n,) bool
+        Whether the point has an image: inside, or within the map's reach.
     element : (n,) int
-        The tetrahedron that carried each point.
+        The tetrahedron that carried each point: of the control mesh, from
+        ``len(control.folded.T)`` on of the shell around it; -1 where there is no image.
+    distance : (n,) float
+        From the control mesh, in the space the points were given in and their unit; 0 inside.
     """
 
     points: Floats
     stratigraphic: Floats
     inside: Bools
+    placed: Bools
     element: Ints
+    distance: Floats
 
     @property
     def location(self) -> np.ndarray:
-        """``inside`` or ``extrapolated`` for every point, (n,) of str."""
-        return np.where(self.inside, INSIDE, EXTRAPOLATED)
+        """``inside``, ``extrapolated`` or ``outside`` (no image) for every point, (n,) of str."""
+        return np.where(self.inside, INSIDE, np.where(self.placed, EXTRAPOLATED, OUTSIDE))
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where points lie in one space: see Carried; barycentric coordinates (n, 4)."""
+
+    element: Ints
+    inside: Bools
+    distance: Floats
+    weights: Floats
+
+
+class _Border:
+    """The border of some tetrahedra."""
+
+    def __init__(self, V: Floats, T: Ints) -> None:
+        F, self.owner, _ = boundary_faces(T)
+        self._index = SurfaceIndex(V, F)
+
+    def closest(self, points: Floats) -> tuple[Floats, Ints]:
+        """Return distance (k,) and the tetrahedron at the closest place (k,)."""
+        distance, face, _ = self._index.closest(points)
+        return distance, self.owner[face]
 
 
 class _Space:
-    """One space of a control mesh, indexed for point location."""
+    """One space of a control mesh and its shell, indexed for point location.
 
-    def __init__(self, mesh: TetMesh, known: Sequence[TetIndex]) -> None:
-        self._mesh = mesh
-        self._turn: Floats | None = None
-        self._index = self._found(known) or TetIndex(mesh.V, mesh.T)
+    Parameters
+    ----------
+    mesh : TetMesh
+        The control mesh.
+    shell : TetMesh or None
+        Tetrahedra around it.
+    reach : float
+        How far points are continued by the nearest element where there is no shell.
+    known : sequence of TetIndex
+        Trees already built, used where one is over this very mesh.
+    """
 
-    def _found(self, known: Sequence[TetIndex]) -> TetIndex | None:
-        """Return the tree among those known that is this mesh's, as it is or turned over."""
-        V, T = self._mesh.V, self._mesh.T
-        for index in known:
-            if index.V.shape != V.shape or not np.array_equal(index.T, T):
-                continue
-            for turn in (None, TURNED_OVER):
-                if np.array_equal(index.V if turn is None else index.V * turn, V):
-                    self._turn = turn
-                    return index
-        return None
+    def __init__(
+        self, mesh: TetMesh, shell: TetMesh | None, reach: float, known: Sequence[TetIndex]
+    ) -> None:
+        self._mesh, self._shell, self._reach = mesh, shell, reach
+        same = [t for t in known if np.array_equal(t.T, mesh.T) and np.array_equal(t.V, mesh.V)]
+        self._index = same[0] if same else TetIndex(mesh.V, mesh.T)
+        self._V = mesh.V if shell is None else shell.V
+        self._T = mesh.T if shell is None else np.concatenate([mesh.T, shell.T])
+        self._touching = TOUCHING * float(np.ptp(mesh.V, axis=0).max())
 
     @cached_property
-    def _border(self) -> tuple[SurfaceIndex, Ints]:
-        faces, owner = boundary_faces(self._mesh.T)
-        return SurfaceIndex(self._index.V, faces), owner
+    def _border(self) -> _Border:
+        return _Border(self._mesh.V, self._mesh.T)
 
-    def locate(self, points: Floats) -> tuple[Ints, Bools, Floats]:
-        """Return element, inside and barycentric coordinates of points (n, 3).
+    @cached_property
+    def _rind(self) -> _Border:
+        """Return the outer border, the shell's included."""
+        return _Border(self._V, self._T)
 
-        A point outside takes the element behind the nearest boundary face.
-        """
-        if self._turn is not None:
-            points = points * self._turn
+    @cached_property
+    def _shell_index(self) -> TetIndex | None:
+        return None if self._shell is None else TetIndex(self._shell.V, self._shell.T)
+
+    def locate(self, points: Floats) -> _Place:
+        """Return where points (n, 3) lie."""
         element = self._index.locate(points)
         inside = element >= 0
-        if not inside.all():
-            surface, owner = self._border
+        distance = np.zeros(len(points))
+        missed = np.flatnonzero(~inside)
+        if len(missed):
             element = element.copy()
-            element[~inside] = owner[surface.closest(points[~inside])[1]]
-        weights = self._index.barycentric(points, element)
-        return element, inside | (weights.min(axis=1) >= -1e-9), weights
+            away, owner = self._border.closest(points[missed])
+            near = away <= self._touching
+            inside[missed] = near
+            distance[missed] = np.where(near, 0.0, away)
+            element[missed[near]] = owner[near]
+            around = missed[~near]
+            element[around] = self._around(points[around], away[~near], owner[~near])
+        corners = self._T[np.maximum(element, 0)]
+        return _Place(element, inside, distance, barycentric_in_tets(points, self._V, corners))
+
+    def _around(self, points: Floats, away: Floats, owner: Ints) -> Ints:
+        """Return the elements that carry points outside the control mesh, -1 for none."""
+        if self._shell_index is None:
+            return np.where(away <= self._reach, owner, -1)
+        found = self._shell_index.locate(points)
+        element = np.where(found >= 0, found + len(self._mesh.T), -1)
+        lost = np.flatnonzero(found < 0)
+        if len(lost):
+            gap, near = self._rind.closest(points[lost])
+            element[lost] = np.where(gap <= self._touching, near, -1)
+        return element
 
 
 class UnfoldingMap:
     """A fitted unfolding: carries any points to the flat space and back.
+
+    Points of the control mesh, and of the shell around it, go there and back exactly: both are
+    the same tetrahedra in either space, none of which overlap where the map is certified.  A
+    control mesh without a shell is continued by its nearest element, which is no such map: a
+    point outside comes back to another place.  What lies farther than the reach has no image.
 
     Parameters
     ----------
@@ -119,22 +167,50 @@ class UnfoldingMap:
         Working frame of the control mesh.
     control : ControlMesh
         In working units.
+    shell : ControlMesh, optional
+        Tetrahedra around it; its first vertices are those of the control mesh.
+    reach : float
+        Largest distance from the control mesh at which points are carried, in working units
+        (blocks).  A shell may end nearer, where limbs or a hinge's inner side leave no room.
     known : sequence of TetIndex, optional
         Trees already built, used where they are over a space of the control mesh.
     """
 
-    def __init__(self, frame: Frame, control: ControlMesh, known: Sequence[TetIndex] = ()) -> None:
+    def __init__(
+        self,
+        frame: Frame,
+        control: ControlMesh,
+        shell: ControlMesh | None = None,
+        reach: float = REACH,
+        known: Sequence[TetIndex] = (),
+    ) -> None:
         self.frame = frame
         self.control = control
+        self.shell = shell
+        self.reach = reach
         self._known = tuple(known)
 
     @cached_property
     def _folded(self) -> _Space:
-        return _Space(self.control.folded, self._known)
+        shell = None if self.shell is None else self.shell.folded
+        return _Space(self.control.folded, shell, self.reach, self._known)
 
     @cached_property
     def _unfolded(self) -> _Space:
-        return _Space(self.control.unfolded, self._known)
+        shell = None if self.shell is None else self.shell.unfolded
+        return _Space(self.control.unfolded, shell, self.reach, self._known)
+
+    @cached_property
+    def whole(self) -> ControlMesh:
+        """The control mesh and its shell as one."""
+        if self.shell is None:
+            return self.control
+        T = np.concatenate([self.control.folded.T, self.shell.folded.T])
+        return ControlMesh(
+            TetMesh(self.shell.folded.V, T),
+            TetMesh(self.shell.unfolded.V, T),
+            self.shell.stratigraphic,
+        )
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
         """Carry points to the flat space, or with ``inverse`` from it back.
@@ -142,7 +218,8 @@ class UnfoldingMap:
         Parameters
         ----------
         points : (n, 3) float
-            Folded points in the data's coordinates; with ``inverse`` unfolded points.
+            Folded points in the data's coordinates; with ``inverse`` unfolded points, whose
+            empty rows (all NaN: no image) stay empty.
         inverse : bool
             Direction.
 
@@ -155,24 +232,34 @@ class UnfoldingMap:
         InputError
             Points of another shape, or not finite.
         """
-        P = checked_points(points)
-        mesh = self.control.folded if inverse else self.control.unfolded
+        P = np.ascontiguousarray(points, dtype=np.float64)
+        if inverse and P.ndim == 2 and np.isnan(P).any():
+            there: Bools = np.logical_not(np.isnan(P).all(axis=1))
+            return _spread(self.carry(P[there], inverse=True), there)
+        P = checked_points(P)
         if not len(P):
-            return Carried(P, np.empty(0), np.empty(0, bool), np.empty(0, np.int64))
-        work = P / self.frame.scale if inverse else self.frame.to_work(P)
-        element, inside, weights = (self._unfolded if inverse else self._folded).locate(work)
-        corners = mesh.T[element]
-        image = np.einsum("ij,ijk->ik", weights, mesh.V[corners])
-        stratigraphic = np.einsum("ij,ij->i", weights, self.control.stratigraphic[corners])
-        out = self.frame.to_world(image) if inverse else image * self.frame.scale
-        return Carried(out, stratigraphic, inside, element)
+            none = np.empty(0, bool)
+            return Carried(P, np.empty(0), none, none, np.empty(0, np.int64), np.empty(0))
+        scale = self.frame.scale
+        work = P / scale if inverse else self.frame.to_work(P)
+        place = (self._unfolded if inverse else self._folded).locate(work)
+        mesh = self.whole.folded if inverse else self.whole.unfolded
+        corners = mesh.T[np.maximum(place.element, 0)]
+        image = np.einsum("ij,ijk->ik", place.weights, mesh.V[corners])
+        out = self.frame.to_world(image) if inverse else image * scale
+        stratigraphic = np.einsum("ij,ij->i", place.weights, self.whole.stratigraphic[corners])
+        placed = place.element >= 0
+        out[~placed] = np.nan
+        stratigraphic[~placed] = np.nan
+        distance = place.distance * scale
+        return Carried(out, stratigraphic, place.inside, placed, place.element, distance)
 
     def to_flat(self, points: Floats) -> Floats:
-        """Return folded points (n, 3) in the flat space, same unit."""
+        """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
         return self.carry(points).points
 
     def to_folded(self, points: Floats) -> Floats:
-        """Return flat points (n, 3) in the folded space, the data's coordinates."""
+        """Return flat points (n, 3) in the folded space, the data's; NaN beyond the reach."""
         return self.carry(points, inverse=True).points
 
     def save(self, path: str | Path | BinaryIO) -> None:
@@ -180,17 +267,37 @@ class UnfoldingMap:
         write_arrays(path, self._arrays())
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        frame, control = self.frame, self.control
+        frame, whole = self.frame, self.whole
+        count = len(self.control.folded.T)
         return {
             "origin": frame.origin,
             "rotation": frame.rotation,
             "scale": np.array(frame.scale),
             "steps": np.full(3, np.nan) if frame.steps is None else frame.steps,
-            "folded": control.folded.V,
-            "unfolded": control.unfolded.V,
-            "tetrahedra": control.folded.T,
-            "stratigraphic": control.stratigraphic,
+            "reach": np.array(self.reach),
+            "folded": whole.folded.V,
+            "unfolded": whole.unfolded.V,
+            "inner": np.array(len(self.control.folded.V)),
+            "tetrahedra": self.control.folded.T,
+            "shell": whole.folded.T[count:],
+            "stratigraphic": whole.stratigraphic,
         }
+
+
+def _spread(carried: Carried, rows: Bools) -> Carried:
+    """Return points carried for some rows among others that have no image."""
+    n = len(rows)
+    points, stratigraphic, distance = (
+        np.full((n, 3), np.nan),
+        np.full(n, np.nan),
+        np.full(n, np.nan),
+    )
+    inside, placed = np.zeros(n, bool), np.zeros(n, bool)
+    element = np.full(n, -1, dtype=np.int64)
+    points[rows], stratigraphic[rows] = carried.points, carried.stratigraphic
+    inside[rows], placed[rows] = carried.inside, carried.placed
+    element[rows], distance[rows] = carried.element, carried.distance
+    return Carried(points, stratigraphic, inside, placed, element, distance)
 
 
 def checked_points(points: Floats) -> Floats:
@@ -210,7 +317,7 @@ def load(path: str | Path) -> UnfoldingMap:
     Raises
     ------
     InputError
-        No such file, not a map, of a later version, or damaged.
+        No such file, not a map, of another version, or damaged.
     """
     arrays = read_arrays(path)
     steps = arrays["steps"]
@@ -220,8 +327,11 @@ def load(path: str | Path) -> UnfoldingMap:
         float(arrays["scale"]),
         None if np.isnan(steps).any() else steps,
     )
-    T = arrays["tetrahedra"].astype(np.int64)
-    control = ControlMesh(
-        TetMesh(arrays["folded"], T), TetMesh(arrays["unfolded"], T), arrays["stratigraphic"]
-    )
-    return UnfoldingMap(frame, control)
+    T, S = arrays["tetrahedra"].astype(np.int64), arrays["shell"].astype(np.int64)
+    whole = [arrays["folded"], arrays["unfolded"], arrays["stratigraphic"]]
+    core = [a[: int(arrays["inner"])] for a in whole]
+    control = ControlMesh(TetMesh(core[0], T), TetMesh(core[1], T), core[2])
+    shell = None
+    if len(S):
+        shell = ControlMesh(TetMesh(whole[0], S), TetMesh(whole[1], S), whole[2])
+    return UnfoldingMap(frame, control, shell, float(arrays["reach"]))

@@ -12,6 +12,7 @@ from geounfold.control import DATUMS
 from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
 from geounfold.hull import HULLS, HullOptions
+from geounfold.mapping import REACH
 from geounfold.quality import NEIGHBOURS
 from geounfold.sheet import SheetOptions
 from geounfold.split import SPLITS
@@ -49,8 +50,10 @@ class UnfoldOptions:
         Which of several separate bodies to unfold, 0 the largest; None when there is one.
     neighbours : int
         Neighbours per point in NMD and epsilon.
+    reach : float
+        How far past the control mesh points are carried, in blocks; beyond they have no image.
     allow_uncertified : bool
-        Write an answer with inverted tetrahedra instead of failing.
+        Give an answer that is not proved one-to-one, marked, instead of failing.
     hull_options, sheet_options, thesis_options
         The stages' own options.
 
@@ -73,6 +76,7 @@ class UnfoldOptions:
     datum: str = "mid"
     body: int | str | None = None
     neighbours: int = NEIGHBOURS
+    reach: float = REACH
     allow_uncertified: bool = False
     hull_options: HullOptions = field(default_factory=HullOptions)
     sheet_options: SheetOptions = field(default_factory=SheetOptions)
@@ -93,6 +97,8 @@ class UnfoldOptions:
             raise OptionError(f"body must be a number from 0 or 'all', but is {self.body}")
         if self.neighbours < 1:
             raise OptionError(f"neighbours must be at least 1, but is {self.neighbours}")
+        if not 0 <= self.reach < np.inf:
+            raise OptionError(f"reach must be a number of blocks from 0 up, but is {self.reach}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the options as plain nested dicts."""

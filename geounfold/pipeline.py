@@ -18,7 +18,8 @@ from geounfold._version import __version__
 from geounfold.backends.blas import one_thread
 from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
-from geounfold.control import ControlMesh, scaled
+from geounfold.certificate import Certificate, certify
+from geounfold.control import ControlMesh, scaled, side_by_side
 from geounfold.errors import ControlMeshError, InputError
 from geounfold.fitting import BodyFit, SurfacePair, fit
 from geounfold.flattening import Flattening
@@ -28,7 +29,7 @@ from geounfold.hull import Hull
 from geounfold.io.coordinates import coordinate_columns, numbers
 from geounfold.lattice import Lattice, measure_lattice
 from geounfold.mapping import Carried, UnfoldingMap, checked_points
-from geounfold.mesh import Floats, Ints, TetMesh, TriMesh, as_trimesh
+from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 from geounfold.options import UnfoldOptions
 from geounfold.quality import Quality, assess, epsilon
 
@@ -112,15 +113,17 @@ def unfold(
         groups = select_body(P, separate_bodies(work, frame), chosen.body)
     reference = _reference(top, bottom, frame)
     fits = [fit(_sorted(work[group]), frame, chosen, reference, clock.stage) for group in groups]
-    control = _joined([f.control for f in fits])
     with clock.stage("map"):
-        known = [index for f in fits if f.sheet for index in f.sheet.mesh.indices]
-        mapping = UnfoldingMap(frame, control, known)
+        mapping = _mapping(fits, frame, chosen)
         carried = mapping.carry(P)
         back = mapping.carry(carried.points, inverse=True)
+    with clock.stage("certificate"):
+        certificate = _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
+    _check_certified(certificate, chosen)
+    _check_placed(groups, P, carried, chosen)
     with clock.stage("quality"):
-        world = _in_world(control, frame)
-        quality = assess(world, carried.element, P, carried.points, chosen.neighbours)
+        world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
+        quality = assess(world, whole, carried.element, P, carried.points, chosen.neighbours)
         torn = _torn(groups, P, carried.points, quality, chosen.neighbours)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
@@ -134,6 +137,7 @@ def unfold(
         carried,
         back,
         quality,
+        certificate,
         clock.seconds,
         fitted,
         len(torn),
@@ -159,7 +163,10 @@ def _torn(
     """Return the rows whose neighbours in their own body came to lie far away."""
     if len(groups) == 1 and len(groups[0]) == len(folded):
         return np.flatnonzero(quality.blocks.nmd_error > TORN)
-    found = [group[epsilon(folded[group], unfolded[group], neighbours) > TORN] for group in groups]
+    found = []
+    for group in groups:
+        rows = group[np.isfinite(unfolded[group, 0])]
+        found.append(rows[epsilon(folded[rows], unfolded[rows], neighbours) > TORN])
     return np.concatenate(found)
 
 
@@ -172,6 +179,35 @@ def _check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
         f"{len(torn)} of {len(folded)} blocks were torn from their neighbours, around ({where}): "
         "limbs too close together, or a sheet too narrow for its thickness; try another --hull, "
         "or --allow-uncertified to write the answer all the same"
+    )
+
+
+def _check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError where the map is not proved, unless that is allowed."""
+    if certificate.injective or options.allow_uncertified:
+        return
+    place = certificate.folded[np.argmax(certificate.blocks)] if len(certificate.folded) else []
+    where = ", ".join(f"{c:.6g}" for c in place)
+    raise ControlMeshError(
+        f"the map is not one-to-one: {', '.join(certificate.faults)}, "
+        f"with {int(certificate.blocks.sum())} blocks, most of them around ({where}); the fold is "
+        "too tight there for this block size: try another --hull or --flattener, or "
+        "--allow-uncertified to write the answer all the same"
+    )
+
+
+def _check_placed(
+    groups: Sequence[Ints], folded: Floats, carried: Carried, options: UnfoldOptions
+) -> None:
+    """Raise ControlMeshError where blocks of a body have no image, unless that is allowed."""
+    rows = np.concatenate([group[~carried.placed[group]] for group in groups])
+    if not len(rows) or options.allow_uncertified:
+        return
+    where = ", ".join(f"{c:.6g}" for c in np.median(folded[rows], axis=0))
+    raise ControlMeshError(
+        f"{len(rows)} of {len(folded)} blocks lie outside the control mesh and farther than its "
+        f"reach, around ({where}): try another --hull, a larger --reach, or --allow-uncertified "
+        "to leave them empty"
     )
 
 
@@ -198,27 +234,24 @@ def _reference(
     )
 
 
-def _joined(controls: list[ControlMesh]) -> ControlMesh:
-    """Return several bodies' control meshes as one, side by side along unfolded x."""
-    if len(controls) == 1:
-        return controls[0]
-    folded, unfolded, tets, stratigraphic = [], [], [], []
-    edge, count = 0.0, 0
-    for control in controls:
-        V = control.unfolded.V
-        shift = np.array([edge - float(V[:, 0].min()), 0.0, 0.0])
-        edge += float(np.ptp(V[:, 0])) + 10.0
-        folded.append(control.folded.V)
-        unfolded.append(V + shift)
-        tets.append(control.folded.T + count)
-        stratigraphic.append(control.stratigraphic)
-        count += len(V)
-    T = np.concatenate(tets)
-    return ControlMesh(
-        TetMesh(np.concatenate(folded), T),
-        TetMesh(np.concatenate(unfolded), T),
-        np.concatenate(stratigraphic),
-    )
+_THESIS_REACH = 10.0  # blocks: the thesis's mesh leaves many outside, and has no shell
+
+
+def _mapping(fits: list[BodyFit], frame: Frame, options: UnfoldOptions) -> UnfoldingMap:
+    """Return the map of all bodies, without shells where those are in each other's way."""
+    reach = options.reach if options.method == "sheet" else _THESIS_REACH
+    control, shell = side_by_side([(f.control, f.shell) for f in fits])
+    if len(fits) > 1 and shell is not None:
+        none = np.empty(0, np.int64)
+        if not certify(control, shell, none).injective:
+            control, shell = side_by_side([(f.control, None) for f in fits])
+    return UnfoldingMap(frame, control, shell, reach)
+
+
+def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
+    """Return a certificate whose places are in the data's coordinates and unit."""
+    folded = frame.to_world(certificate.folded)
+    return replace(certificate, folded=folded, unfolded=certificate.unfolded * frame.scale)
 
 
 def _in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
@@ -239,7 +272,7 @@ class Unfolding:
     stratigraphic : (n,) float
         0 at the bottom surface, 1 at the top.
     location : (n,) str
-        ``inside`` the control mesh, or ``extrapolated``.
+        ``inside`` the control mesh, ``extrapolated`` around it, or ``outside``: left empty.
     options : UnfoldOptions
         As used.
     frame : Frame
@@ -252,6 +285,8 @@ class Unfolding:
         Carries any points both ways.
     quality : Quality
         Figures for the whole and per block.
+    certificate : Certificate
+        What is proved of the map, and what stands against it; also a mapping.
     seconds : dict of float
         Per stage.
     """
@@ -267,6 +302,7 @@ class Unfolding:
         carried: Carried,
         back: Carried,
         quality: Quality,
+        certificate: Certificate,
         seconds: dict[str, float],
         fitted_points: int,
         torn: int,
@@ -279,6 +315,7 @@ class Unfolding:
         self.map = mapping
         self.carried = carried
         self.quality = quality
+        self.certificate = certificate
         self.seconds = seconds
         self._returned = back.points
         self._fitted_points = fitted_points
@@ -296,7 +333,7 @@ class Unfolding:
 
     @property
     def location(self) -> np.ndarray:
-        """``inside`` or ``extrapolated`` for every point, (n,) of str."""
+        """``inside``, ``extrapolated`` or ``outside`` (empty) for every point, (n,) of str."""
         return self.carried.location
 
     @property
@@ -357,21 +394,11 @@ class Unfolding:
 
     @property
     def round_trip_max(self) -> float:
-        """Largest distance, over the points inside, between a point and its return."""
-        inside = self.carried.inside
-        if not inside.any():
+        """Largest distance, over the points that have an image, between a point and its return."""
+        placed = self.carried.placed
+        if not placed.any():
             return 0.0
-        return float(np.linalg.norm(self._returned - self.folded, axis=1)[inside].max())
-
-    @property
-    def certificate(self) -> dict[str, Any]:
-        """What was proved of the map; ``injective`` is True only when all of it was."""
-        return {
-            "injective": False,
-            "inverted_folded": self.map.control.inverted_folded,
-            "inverted_unfolded": self.map.control.inverted_unfolded,
-            "unchecked": "self-intersection of the control mesh's boundary",
-        }
+        return float(np.linalg.norm(self._returned - self.folded, axis=1)[placed].max())
 
     def save(self, path: str | Path | BinaryIO) -> None:
         """Write the map (not the points) as .npz; ``geounfold.load`` reads it."""
@@ -393,11 +420,12 @@ class Unfolding:
             "flattening": {k: _flattening_summary(f) for k, f in self.fits[0].flattenings.items()},
             "method": self.fits[0].notes,
             "control_mesh": self._control_summary(),
-            "inverted_folded": certificate["inverted_folded"],
-            "inverted_unfolded": certificate["inverted_unfolded"],
-            "injective": certificate["injective"],
-            "certificate": certificate,
+            "inverted_folded": certificate.inverted_folded,
+            "inverted_unfolded": certificate.inverted_unfolded,
+            "injective": certificate.injective,
+            "certificate": certificate.as_dict(),
             "outside_share": self.outside_share,
+            "outside": self._outside_summary(),
             "round_trip_max": self.round_trip_max,
             "torn": self._torn,
             **self.quality.summary(),
@@ -409,6 +437,15 @@ class Unfolding:
         if self.lattice is None:
             return {"found": False, "spacing": spacing}
         return {"found": True, "spacing": spacing, "steps": self.lattice.steps.tolist()}
+
+    def _outside_summary(self) -> dict[str, Any]:
+        carried = self.carried
+        return {
+            "extrapolated": int((carried.placed & ~carried.inside).sum()),
+            "empty": int((~carried.placed).sum()),
+            "largest_distance": float(carried.distance.max()),
+            "reach": self.map.reach * self.frame.scale,
+        }
 
     def _hull_summary(self) -> dict[str, Any]:
         hull = self.hull
@@ -449,20 +486,24 @@ class Unfolding:
         apart = len(self.folded) - self._fitted_points
         if apart:
             out.append(
-                f"{apart} points are not part of the unfolded body; they were carried by the "
-                "nearest element of its control mesh"
+                f"{apart} points are not part of the unfolded body; they were carried where its "
+                "map reaches them"
             )
-        outside = int((~self.carried.inside).sum())
-        if outside:
+        outside, empty = (int((~a).sum()) for a in (self.carried.inside, self.carried.placed))
+        if outside > empty:
             out.append(
-                f"{outside} of {len(self.folded)} points lie outside the control mesh and were "
-                "carried by its nearest element; they are marked extrapolated"
+                f"{outside - empty} of {len(self.folded)} points lie outside the control mesh and "
+                "were carried by its continuation; they are marked extrapolated"
+            )
+        if empty:
+            out.append(
+                f"{empty} of {len(self.folded)} points lie farther from the control mesh than the "
+                f"map reaches ({self.map.reach * self.frame.scale:.6g}); they were left empty"
             )
         if self._torn:
             out.append(f"{self._torn} blocks were torn from their neighbours")
-        inverted = self.map.control.inverted_folded + self.map.control.inverted_unfolded
-        if inverted:
-            out.append(f"{inverted} control tetrahedra are inverted: the map folds over there")
+        if not self.certificate.injective:
+            out.append(f"the map is not proved one-to-one: {', '.join(self.certificate.faults)}")
         return out
 
     def __repr__(self) -> str:

@@ -444,8 +444,8 @@ def block_quality(
     control : ControlMesh
         The map.
     elements : (n,) int
-        The tetrahedron that carried each block: the one that holds it, or, outside the mesh, the
-        one whose map was continued.
+        The tetrahedron that carried each block; -1 for a block without an image, whose figures
+        are NaN and which is no other block's neighbour.
     folded, unfolded : (n, 3) float
         The blocks in both spaces, in the same unit.
     k : int
@@ -462,18 +462,25 @@ def block_quality(
     count = len(control.folded.T)
     if rows.shape != (len(folded),):
         raise InputError(f"elements must have shape ({len(folded)},), but have {rows.shape}")
-    if rows.size and not 0 <= rows.min() <= rows.max() < count:
+    if rows.size and not -1 <= rows.min() <= rows.max() < count:
         raise InputError(
             f"elements name {rows.min()}..{rows.max()}, but there are {count} tetrahedra"
         )
-    used, back = np.unique(rows, return_inverse=True)
+    placed = rows >= 0
+    used, back = np.unique(rows[placed], return_inverse=True)
     d = distortion(deformation_gradients(control, used))
+
+    def spread(values: Floats) -> Floats:
+        out = np.full(len(rows), np.nan)
+        out[placed] = values
+        return out
+
     return BlockQuality(
-        volume_ratio=d.volume_ratio[back],
-        nmd_error=epsilon(folded, unfolded, k),
-        stretch_min=d.stretch_min[back],
-        stretch_max=d.stretch_max[back],
-        shear=d.shear[back],
+        volume_ratio=spread(d.volume_ratio[back]),
+        nmd_error=spread(epsilon(folded[placed], unfolded[placed], k)),
+        stretch_min=spread(d.stretch_min[back]),
+        stretch_max=spread(d.stretch_max[back]),
+        shear=spread(d.shear[back]),
     )
 
 
@@ -516,17 +523,33 @@ class Quality:
 
 
 def assess(
-    control: ControlMesh, elements: Ints, folded: Floats, unfolded: Floats, k: int = NEIGHBOURS
+    control: ControlMesh,
+    whole: ControlMesh,
+    elements: Ints,
+    folded: Floats,
+    unfolded: Floats,
+    k: int = NEIGHBOURS,
 ) -> Quality:
-    """Return the quality of an unfolding; parameters and errors as for `block_quality`."""
-    blocks = block_quality(control, elements, folded, unfolded, k)
+    """Return the quality of an unfolding, over the blocks that have an image.
+
+    Parameters
+    ----------
+    control : ControlMesh
+        The body's tetrahedra.
+    whole : ControlMesh
+        Those and the shell around them, which ``elements`` name.
+    elements, folded, unfolded, k
+        As for `block_quality`, errors too.
+    """
+    blocks = block_quality(whole, elements, folded, unfolded, k)
+    placed = np.asarray(elements) >= 0
     before = tet_volumes(control.folded.V, control.folded.T)
     after = tet_volumes(control.unfolded.V, control.unfolded.T)
     return Quality(
         blocks=blocks,
-        nmd=Statistics.of(blocks.nmd_error),
-        shear=Statistics.of(blocks.shear),
-        volume_change=Statistics.of(np.abs(blocks.volume_ratio - 1)),
+        nmd=Statistics.of(blocks.nmd_error[placed]),
+        shear=Statistics.of(blocks.shear[placed]),
+        volume_change=Statistics.of(np.abs(blocks.volume_ratio[placed] - 1)),
         edge_change=Statistics.of(np.abs(edge_change(control.folded, control.unfolded))),
         volume_folded=float(before.sum()),
         volume_unfolded=float(after.sum()),

@@ -247,6 +247,8 @@ def verdict(summary: Mapping[str, Any]) -> Verdict:
     level, headline = "care", "Usable: nothing is inverted. That it is one to one is not proved."
     if any(inverted):
         level, headline = "bad", "The map folds over itself: do not use it as it is."
+    elif proved is False:
+        level, headline = "bad", "The map is not proved one to one: do not use it as it is."
     elif None in inverted:
         headline = "It is not known whether the map folds over itself."
     elif outside is not None and outside > _CARE:
@@ -260,6 +262,23 @@ def _reasons(summary: Mapping[str, Any]) -> Iterable[str]:
     folded, unfolded = summary.get("inverted_folded"), summary.get("inverted_unfolded")
     if folded is not None and unfolded is not None:
         yield f"Inverted tetrahedra: {folded} in the folded space, {unfolded} in the unfolded one."
+    certificate = _mapping(summary.get("certificate"))
+    if certificate.get("injective") is True:
+        yield (
+            f"Proved: {certificate['tetrahedra']} tetrahedra, none inverted, and "
+            f"{certificate['boundary_faces']} border faces, none crossing, in both spaces, by "
+            "exact predicates; so the map is one to one (Lipman 2014)."
+        )
+    elif certificate:
+        yield (
+            f"Not proved: {_number(certificate['crossing_folded'])} pairs of border faces cross in "
+            f"the folded space, {_number(certificate['crossing_unfolded'])} in the unfolded one; "
+            f"{_number(certificate['blocks_in_faulty_elements'])} blocks lie in elements at fault "
+            "(listed below, and marked in the mesh that --mesh writes)."
+        )
+    empty = _mapping(summary.get("outside")).get("empty")
+    if empty:
+        yield f"{_number(empty)} blocks lie beyond the map's reach and were left empty."
     outside = summary.get("outside_share")
     if outside is not None:
         share = "every block" if outside == 0 else f"all blocks but {outside:.3%}"
@@ -423,7 +442,9 @@ _MADE = {
     "control_mesh.tetrahedra": "tetrahedra of the control mesh",
     "control_mesh.volume_folded": "its volume, folded",
     "control_mesh.volume_unfolded": "its volume, unfolded",
-    "certificate.unchecked": "not checked",
+    "certificate.tetrahedra": "tetrahedra proved",
+    "certificate.theorem": "by the theorem",
+    "outside.reach": "reach around the control mesh",
 }
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from geounfold.control import Datum
 from geounfold.errors import InputError, OptionError
-from geounfold.geometry import triangle_areas
+from geounfold.geometry import tet_volumes, triangle_areas
 from geounfold.mesh import TriMesh
 from geounfold.reference import split_reference
 from geounfold.sheet.build import register
 from geounfold.sheet.footprint import footprint
 from geounfold.sheet.horizons import Horizons
-from geounfold.sheet.layers import Layers, bad_nodes, neighbour_mean, shrink
+from geounfold.sheet.layers import Layers, neighbour_mean, shrink
 from geounfold.sheet.spline import SplineGrid
 
 RNG = np.random.default_rng(2)
@@ -68,6 +68,12 @@ def bent_layers(radius, reach):
     curvature = np.stack([np.full(n, 1 / radius), np.full(n, -1 / radius)])
     offset = np.full(n, reach)
     return Layers(P, normal, U.U, slope, -slope, U.F, curvature, offset, offset)
+
+
+def bad_nodes(layers, T):
+    """Nodes of tetrahedra that are not upright in both spaces."""
+    volumes = np.stack([tet_volumes(V, T) for V in (layers.folded, layers.unfolded)])
+    return np.unique(T[(volumes <= 0).any(axis=0)] % len(layers.P))
 
 
 def test_offsets_within_the_focal_distance_are_upright_and_shrink_past_it():

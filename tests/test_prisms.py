@@ -5,8 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from geounfold.geometry import tet_volumes
-from geounfold.mapping import boundary_faces
+from geounfold.geometry import boundary_faces, tet_volumes
 from geounfold.prisms import prism_tets
 
 
@@ -28,7 +27,7 @@ def test_neighbours_share_their_diagonals():
     V = np.concatenate([np.column_stack([square, np.full(4, z)]) for z in (0.0, 1.0, 2.0)])
     T = prism_tets(F, 4, 3)
     assert tet_volumes(V, T).sum() == pytest.approx(2.0)
-    faces, owner = boundary_faces(T)
+    faces, owner, _ = boundary_faces(T)
     sides = V[faces]
     area = np.linalg.norm(
         np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1

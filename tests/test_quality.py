@@ -162,7 +162,7 @@ def cube_map(J):
 def test_blocks_get_the_distortion_of_the_element_that_carried_them():
     J = np.array([[1.0, 0, 0.5], [0, 1, 0], [0, 0, 2.0]])
     elements = np.arange(len(GRID)) % 3  # three of six elements carry blocks
-    q = assess(cube_map(J), elements, GRID, GRID @ J.T)
+    q = assess(cube_map(J), cube_map(J), elements, GRID, GRID @ J.T)
     columns = q.blocks.columns()
     assert list(columns) == ["volume_ratio", "nmd_error", "stretch_min", "stretch_max", "shear"]
     assert all(c.shape == (len(GRID),) for c in columns.values())
@@ -177,9 +177,21 @@ def test_blocks_get_the_distortion_of_the_element_that_carried_them():
 
 
 def test_inverted_elements_are_counted_and_volumes_keep_their_sign():
-    q = assess(cube_map(np.diag([1.0, 1, -1])), np.zeros(len(GRID), int), GRID, GRID * [1, 1, -1])
+    mesh, elements = cube_map(np.diag([1.0, 1, -1])), np.zeros(len(GRID), int)
+    q = assess(mesh, mesh, elements, GRID, GRID * [1, 1, -1])
     assert (q.inverted_folded, q.inverted_unfolded) == (0, 6)
     assert q.volume_unfolded == pytest.approx(-729)
+
+
+def test_a_block_without_an_image_has_no_figures_and_disturbs_no_others():
+    elements, moved = np.zeros(len(GRID), int), np.array(GRID)
+    elements[7], moved[7] = -1, np.nan
+    q = assess(cube_map(np.eye(3)), cube_map(np.eye(3)), elements, GRID, moved)
+    for column in q.blocks.columns().values():
+        assert np.flatnonzero(np.isnan(column)).tolist() == [7]
+    # Nothing has moved, so that nothing but the missing block could change a distance.
+    assert q.nmd.max < ROUNDING
+    assert q.volume_change.max < ROUNDING
 
 
 # --- what is refused
@@ -208,8 +220,8 @@ def test_inverted_elements_are_counted_and_volumes_keep_their_sign():
             "elements must have shape",
         ),
         (
-            lambda: block_quality(cube_map(np.eye(3)), np.full(len(GRID), -1), GRID, GRID),
-            "elements name -1..-1, but there are 6",
+            lambda: block_quality(cube_map(np.eye(3)), np.full(len(GRID), -2), GRID, GRID),
+            "elements name -2..-2, but there are 6",
         ),
     ],
 )

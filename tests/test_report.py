@@ -100,7 +100,7 @@ def test_a_summary_without_anything_still_gives_a_page():
     ("change", "level", "said"),
     [
         ({}, "good", "proved"),
-        ({"injective": False}, "care", "not proved"),
+        ({"injective": False}, "bad", "not proved"),  # looked at, and at fault
         ({"injective": None}, "care", "not proved"),
         ({"outside_share": 0.02}, "care", "2.00% of the blocks"),
         ({"inverted_unfolded": 1}, "bad", "folds over itself"),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import igl
+import igl.predicates
 import numpy as np
 
 from geounfold.errors import BackendError
-from geounfold.mesh import Floats, Ints
+from geounfold.mesh import Bools, Floats, Ints
 
 
 def _f(a: Floats) -> Floats:
@@ -68,10 +69,11 @@ class TetIndex:
         """Return the tetrahedron holding each query point, (k,); -1 outside all."""
         return np.asarray(igl.in_element(self.V, self.T, _f(Q), self._tree), dtype=np.int64)
 
-    def barycentric(self, Q: Floats, element: Ints) -> Floats:
-        """Return the barycentric coordinates of each point in its tetrahedron, (k, 4)."""
-        corners = [_f(self.V[self.T[element, k]]) for k in range(4)]
-        return np.asarray(igl.barycentric_coordinates(_f(Q), *corners))
+
+def barycentric_in_tets(Q: Floats, V: Floats, T: Ints) -> Floats:
+    """Return barycentric coordinates (k, 4) of points Q, each in its own tetrahedron T (k, 4)."""
+    corners = [_f(V[T[:, k]]) for k in range(4)]
+    return np.asarray(igl.barycentric_coordinates(_f(Q), *corners))
 
 
 def barycentric_in_triangles(Q: Floats, V: Floats, F: Ints) -> Floats:
@@ -99,12 +101,34 @@ def boundary_loops(F: Ints) -> list[Ints]:
     return sorted(loops, key=len, reverse=True)
 
 
+def upright(V: Floats, T: Ints) -> Bools:
+    """Return which tetrahedra have positive volume, (m,): Shewchuk's exact predicate."""
+    V = _f(V)
+    a, b, c, d = (V[T[:, k]] for k in range(4))
+    sign = igl.predicates.orient3d(a, b, c, d)  # positive where d lies below, left-handed
+    return np.asarray(sign).ravel() < 0
+
+
+def self_intersections(V: Floats, F: Ints) -> Ints:
+    """Return the pairs of triangles that intersect beyond what they share, (k, 2), exactly.
+
+    Neighbours that lie on top of each other count, and so does a mere touch between triangles
+    that share nothing there.
+    """
+    _, pairs, _ = igl.predicates.find_self_intersections(_f(V), _i(F))
+    return np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def winding_number(V: Floats, F: Ints, Q: Floats) -> Floats:
+    """Return how often a closed surface winds about each query point, (k,)."""
+    return np.asarray(igl.winding_number(_f(V), _i(F), _f(Q))).ravel()
+
+
 def is_manifold(F: Ints) -> bool:
     """Return True where every edge has at most two faces and every vertex one fan of faces."""
     edge = igl.is_edge_manifold(_i(F))
     edge_ok = bool(np.all(edge[0] if isinstance(edge, tuple) else edge))
-    vertex = igl.is_vertex_manifold(_i(F))
-    return edge_ok and bool(np.all(vertex[0] if isinstance(vertex, tuple) else vertex))
+    return edge_ok and not len(pinched_vertices(F))
 
 
 def marching_cubes(

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from geounfold.mapping import Carried
     from geounfold.mesh import Floats, TriMesh
     from geounfold.options import UnfoldOptions
-    from geounfold.pipeline import Unfolding
 
 _JSON = (".json",)
 _MAP = (".npz",)
+_VTU = (".vtu",)
 _HTML = (".html", ".htm")
 _PICTURE = (".png",)
 _UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
 _FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
 _TRUE: Triple = ("true_x", "true_y", "true_z")
-_MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours")
+_MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours", "reach")
 
 
 def unfold(args: Namespace, console: Console) -> None:
@@ -42,6 +42,7 @@ def unfold(args: Namespace, console: Console) -> None:
             "--output": (args.output, TABLE_ENDINGS),
             "--summary": (args.summary, _JSON),
             "--map": (args.map, _MAP),
+            "--mesh": (args.mesh, _VTU),
             "--report": (args.report, _HTML),
             "--samples-out": (args.samples_out, TABLE_ENDINGS),
         },
@@ -71,6 +72,10 @@ def unfold(args: Namespace, console: Console) -> None:
             samples.write(parts["--samples-out"], carried)
         if "--map" in parts:
             result.save(parts["--map"])
+        if "--mesh" in parts:
+            from geounfold.io.volumes import write_control
+
+            write_control(parts["--mesh"], result.map, result.certificate)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
         if "--report" in parts:
@@ -110,11 +115,19 @@ def carry(args: Namespace, console: Console) -> None:
 
 def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:
     """Say how many carried points the control mesh does not hold."""
-    outside = int(np.count_nonzero(columns["location"] == "extrapolated"))
-    if outside:
+    from geounfold.mapping import EXTRAPOLATED, OUTSIDE
+
+    location = columns["location"]
+    extrapolated, empty = (int(np.count_nonzero(location == w)) for w in (EXTRAPOLATED, OUTSIDE))
+    if extrapolated:
         console.warn(
-            f"{path}: {outside} of {len(columns['location'])} points lie outside the control mesh "
-            "and were carried by its nearest element; they are marked extrapolated"
+            f"{path}: {extrapolated} of {len(location)} points lie outside the control mesh and "
+            "were carried by its continuation; they are marked extrapolated"
+        )
+    if empty:
+        console.warn(
+            f"{path}: {empty} of {len(location)} points lie farther from the control mesh than "
+            "the map reaches; they were left empty and are marked outside"
         )
 
 
@@ -302,10 +315,15 @@ def _read_samples(args: Namespace, console: Console) -> PointTable | None:
     return table
 
 
-def _columns(names: Triple, mapped: Carried | Unfolding) -> dict[str, Any]:
+def _columns(names: Triple, mapped: Carried) -> dict[str, Any]:
     """Return where points came to lie, by output column."""
     points = {name: mapped.points[:, axis] for axis, name in enumerate(names)}
-    return {**points, "stratigraphic": mapped.stratigraphic, "location": mapped.location}
+    return {
+        **points,
+        "stratigraphic": mapped.stratigraphic,
+        "location": mapped.location,
+        "mesh_distance": mapped.distance,
+    }
 
 
 def _options(args: Namespace) -> UnfoldOptions:
@@ -316,6 +334,7 @@ def _options(args: Namespace) -> UnfoldOptions:
         "up": _direction,
         "body": _body,
         "neighbours": lambda text: _count(text, "--neighbours"),
+        "reach": _reach,
     }
     given = {n: getattr(args, n) for n in _MODEL if hasattr(args, n)}
     values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
@@ -330,6 +349,13 @@ def _direction(text: str) -> tuple[float, float, float]:
     except ValueError as error:
         raise OptionError(f"--up needs three numbers such as 0,0,1, not '{text}'") from error
     return x, y, z
+
+
+def _reach(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise OptionError(f"--reach needs a number of blocks such as 3, not '{text}'") from error
 
 
 def _body(text: str) -> int | str:

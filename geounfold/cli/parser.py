@@ -19,7 +19,8 @@ results:
   unfolded_x, unfolded_y, unfolded_z   coordinates with the folds taken out, in the input's
                      unit; z is up towards the top side, in true thickness
   stratigraphic      0 at the bottom surface, 1 at the top
-  location           inside, or extrapolated outside the control mesh
+  location           inside the control mesh, extrapolated around it, or outside: left empty
+  mesh_distance      distance from the control mesh, 0 inside it
 """
 _UNFOLD = (
     _RESULTS
@@ -34,7 +35,7 @@ _MAP = (
     + """\
 with --inverse (columns unfolded_x/y/z are taken first where they exist):
   folded_x, folded_y, folded_z         coordinates with the folds put back
-  location           as above
+  location, mesh_distance               as above, in the unfolded space
 
 Every input column and row comes back in order. An input column called as a result is replaced
 in its place."""
@@ -201,6 +202,12 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
     group.add_argument(
         "--neighbours", metavar="K", help="neighbours per block in NMD (default 26)", **given
     )
+    group.add_argument(
+        "--reach",
+        metavar="B",
+        help="how far around the body points are carried, in blocks (default 3)",
+        **given,
+    )
     return group
 
 
@@ -211,6 +218,9 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
     parser.add_argument("--map", metavar="M.npz", help="the map, for `geounfold map`")
     parser.add_argument("--report", metavar="R.html", help="figures and pictures")
+    parser.add_argument(
+        "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
+    )
     parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_TABLES}")
     parser.add_argument("--samples-out", metavar="Q", help="where they go")
     parser.add_argument(
@@ -225,7 +235,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
         "--allow-uncertified",
         action="store_true",
         default=argparse.SUPPRESS,
-        help="write the answer even where control tetrahedra are inverted",
+        help="write the answer, marked, even where the map is not proved one-to-one",
     )
 
 

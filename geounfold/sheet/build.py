@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from geounfold.backends.igl import TetIndex
 from geounfold.control import ControlMesh, Datum
 from geounfold.flattening._result import Flattening
-from geounfold.mesh import Floats, Ints, TetMesh, TriMesh
+from geounfold.mesh import Floats, TriMesh
+from geounfold.sheet.columns import Columns
 from geounfold.sheet.fit import FittedSheet
 from geounfold.sheet.footprint import Footprint, footprint, principal_direction
 from geounfold.sheet.horizons import Horizons
-from geounfold.sheet.layers import Layers, bad_nodes, neighbour_mean, shrink
+from geounfold.sheet.ladder import Rung, climb
+from geounfold.sheet.layers import FINE_FRACTIONS, FRACTIONS, Layers, bounded_slope
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
 Flatten = Callable[[TriMesh, Floats | None], Flattening]
@@ -29,9 +31,10 @@ class ControlOptions:
     more cells than ``many`` cells grow up to the widest while the surface turns by no more than
     ``turn`` radians over one; ``dilation``: rings of cells past the blocks;
     ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
-    where they vary; ``focal``: largest share of the focal distance; ``reach``: radius, in
-    cells, of the filter on varying offsets; ``shrinks``: most steps of the repair;
-    ``trip``: largest round-trip error of a block.
+    where they vary; ``focal``: largest share of the focal distance, ``focal_refined``: the same
+    with cells of half the side; ``slopes``: of the caps along the sheet, tried in order;
+    ``reach``: radius, in cells, of the filter on varying offsets;
+    ``shrinks``: most steps of the repair; ``shell``: how far the shell reaches past the mesh.
     """
 
     cell: float = 1.5
@@ -44,8 +47,10 @@ class ControlOptions:
     focal: float = 0.9
     slope: float = 0.7
     reach: int = 3
+    slopes: tuple[float, ...] = (0.3, 0.6, 1.2)
+    focal_refined: float = 0.95
     shrinks: int = 40
-    trip: float = 1e-6
+    shell: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,28 +61,25 @@ class SheetMesh:
     ----------
     control : ControlMesh
         Tetrahedra in both spaces.
+    shell : ControlMesh or None
+        Tetrahedra around them, over the control mesh's vertices and others.
     flattenings : dict of Flattening
         The mid surface (``mid``) and the parallel surfaces above and below it (``top``,
         ``bottom``), over the same footprint, as they were flattened.
     layers : Layers
         The prisms.
-    rung : str
-        Last rung of the ladder that was needed: constant, capped or shrunk.
-    shrinks : int
-        Steps of the shrinking rung.
+    rungs : tuple of Rung
+        What every rung of the ladder gave that was needed; the last is the one taken.
     surfaces : dict of (TriMesh, TriMesh)
         Mid, top and bottom surface, folded and unfolded, over the footprint.
-    indices : tuple of TetIndex
-        Trees that were built over the prisms in either space; none after a repair that failed.
     """
 
     control: ControlMesh
+    shell: ControlMesh | None
     flattenings: dict[str, Flattening]
     layers: Layers
-    rung: str
-    shrinks: int
+    rungs: tuple[Rung, ...]
     surfaces: dict[str, tuple[TriMesh, TriMesh]]
-    indices: tuple[TetIndex, ...] = ()
 
 
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
@@ -117,14 +119,14 @@ class _Nodes:
     mean_normal: Floats
 
 
-def _lifted_nodes(sheet: Sheet, prints: Footprint) -> _Nodes:
-    """Return the nodes of both kinds at the footprint's parameters."""
-    jet = sheet.jet(prints.U)
+def _lifted_nodes(sheet: Sheet, U: Floats, prints: Footprint) -> _Nodes:
+    """Return the nodes of both kinds at parameters U (n, 2) of a footprint's grid."""
+    jet = sheet.jet(U)
     P, normal = jet.value, normals(jet)
     bend_P, bend_n = np.zeros_like(P), np.zeros_like(P)
     for axis in prints.axes * prints.cell:
         for step in (axis, -axis):
-            near = sheet.jet(prints.U + step)
+            near = sheet.jet(U + step)
             bend_P += near.value - P
             bend_n += normals(near) - normal
     return _Nodes(P - bend_P / 24, normal - bend_n / 24, P - bend_P / 12, normal - bend_n / 12)
@@ -150,7 +152,8 @@ def _flatten_sheet(
 
     The fitted ``slip`` (n, 2) per height is the start of the latter two.
     """
-    P, normal = nodes.chord_points, nodes.chord_normal
+    n = len(prints.U)
+    P, normal = nodes.chord_points[:n], nodes.chord_normal[:n]
     middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
     above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid - reach[0] * slip)
@@ -178,73 +181,95 @@ def _safely_flat(
     return result
 
 
+_STRAIGHT = 1e-9  # curvature below which a surface has no focal distance to speak of
+
+
 def _focal_caps(curvature: Floats, focal: float) -> Floats:
-    return np.asarray(focal / np.maximum(curvature, 1e-9))
+    return np.asarray(focal / np.maximum(curvature, _STRAIGHT))
 
 
-def _offsets(prints: Footprint, foot: Foot, caps: Floats, options: ControlOptions) -> Floats:
-    """Return offsets (2, n) that follow the blocks, capped at a share of the focal distance."""
-    use = foot.miss < 0.5
+def _offsets(columns: Columns, foot: Foot, caps: Floats, options: ControlOptions) -> Floats:
+    """Return offsets (2, n) that follow the blocks under caps (2, n)."""
+    prints, use = columns.prints, foot.miss < 0.5
     need = [prints.cell_max(s * foot.t, use) for s in (1.0, -1.0)]
     follow = [prints.at_nodes(q, options.reach) + options.pad_capped for q in need]
     return np.minimum(np.stack(follow), caps)
 
 
-def _round_trip_misses(there: TetIndex, back: TetIndex, points: Floats, limit: float) -> Ints:
-    """Return the vertices of tetrahedra holding blocks that do not come back."""
-    folded, unfolded, T = there.V, back.V, there.T
-    first = there.locate(points)
-    inside = first >= 0
-    b = there.barycentric(points[inside], first[inside])
-    flat = np.einsum("ij,ijk->ik", b, unfolded[T[first[inside]]])
-    second = back.locate(flat)
-    other = np.where(second >= 0, second, first[inside])
-    returned = np.einsum("ij,ijk->ik", back.barycentric(flat, other), folded[T[other]])
-    missed = np.abs(returned - points[inside]).max(axis=1) > limit
-    vertices: Ints = T[np.concatenate([first[inside][missed], other[missed]])].ravel()
-    return vertices
+def _sloping_caps(columns: Columns, focal: float, slope: float) -> Floats:
+    """Return caps (2, n) on the offsets: a share of the focal distance, of bounded slope.
 
-
-def _climb(
-    layers: Layers, follow: Floats, constant: bool, points: Floats, options: ControlOptions
-) -> tuple[Layers, str, int, tuple[TetIndex, ...]]:
-    """Return layers that are upright in both spaces and bring every block back.
-
-    With them the last rung, the shrinks, and where blocks were carried the trees of both spaces.
-
-    Rungs: constant offsets (parallel surfaces), offsets that follow the blocks under the
-    focal cap, then shrinking around what is still wrong.
+    At a hinge the mesh's border has to run on nearly parallel to the sheet: where it dips
+    towards a focal line and out again, columns cross those two away.
     """
-    T = layers.tets()
-    mean = neighbour_mean(layers.F, len(layers.P))
-    rung = "constant" if constant else "capped"
-    for shrinks in range(options.shrinks + 1):
-        nodes = bad_nodes(layers, T)
-        indices: tuple[TetIndex, ...] = ()
-        if not len(nodes):
-            there, back = TetIndex(layers.folded, T), TetIndex(layers.unfolded, T)
-            indices = (there, back)
-            missed = _round_trip_misses(there, back, points, options.trip)
-            nodes = np.unique(missed % len(layers.P))
-        if not len(nodes) or shrinks == options.shrinks:
-            break
-        if rung == "constant":
-            rung, layers = "capped", replace(layers, up=follow[0], down=follow[1])
-            continue
-        rung, layers = "shrunk", shrink(layers, nodes, mean)
-    return layers, rung, shrinks, indices
+    F, n = columns.prints.F, columns.count
+    caps = _focal_caps(columns.curvature[:, :n], focal)
+    return np.stack([bounded_slope(cap, columns.prints.U, F, slope) for cap in caps])
 
 
-def _footprint(sheet: Sheet, U: Floats, options: ControlOptions) -> Footprint:
-    """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow."""
+def _footprint(sheet: Sheet, U: Floats, options: ControlOptions, side: float | None) -> Footprint:
+    """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow.
+
+    ``side``: that of the cells, where it is not left to size and bends.
+    """
     angle = principal_direction(sheet, U)
-    prints = footprint(U, angle, options.cell, options.dilation)
-    if len(prints.F) <= 2 * options.many:
+
+    def prints_of(cell: float) -> Footprint:
+        rings = int(np.ceil(options.shell / cell))
+        return footprint(U, angle, cell, options.dilation, rings)
+
+    prints = prints_of(options.cell if side is None else side)
+    if side is not None or len(prints.F) <= 2 * options.many:
         return prints
     k1, k2 = principal_curvatures(sheet.jet(prints.U))
     bend = float(np.percentile(np.maximum(k1, -k2), 99))
     cell = min(options.widest, options.turn / max(bend, 1e-9))
-    return footprint(U, angle, cell, options.dilation) if cell > options.cell else prints
+    return prints_of(cell) if cell > options.cell else prints
+
+
+def _columns(
+    fitted: FittedSheet,
+    horizons: Horizons,
+    foot: Foot,
+    cell: float | None,
+    flatten: Flatten,
+    options: ControlOptions,
+    datum: str,
+) -> Columns:
+    """Return the columns over the blocks' footprint; ``cell`` None chooses its cells' side."""
+    sheet = fitted.sheet
+    prints = _footprint(sheet, foot.U, options, cell)
+    every = np.concatenate([prints.U, prints.ring.U])
+    k1, k2 = principal_curvatures(sheet.jet(every))
+    curvature = np.stack([k1, -k2])
+    n = len(prints.U)
+    reach = _reach(foot, options)
+    caps = _focal_caps(curvature[:, :n], options.focal)
+    safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
+    nodes = _lifted_nodes(sheet, every, prints)
+    slip = sheet.grid.value(fitted.slip, every)
+    flat = _safely_flat(nodes, prints, slip[:n], (safe[0], safe[1]), flatten)
+    bottom, top = horizons.crossings(prints.U, slip[:n], limit=2 * reach)
+    means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
+    return Columns(
+        prints=prints,
+        P=nodes.mean_points,
+        normal=nodes.mean_normal,
+        slip=slip,
+        flat=flat.flat,
+        slope_up=flat.slopes[0],
+        slope_down=flat.slopes[1],
+        curvature=curvature,
+        flattenings=flat.flattenings,
+        horizons=horizons,
+        datum=Datum(datum, means[0], means[1]),
+        reach=options.shell,
+    )
+
+
+def _reach(foot: Foot, options: ControlOptions) -> float:
+    """Return the offset that holds every block."""
+    return float(np.abs(foot.t[foot.miss < 0.5]).max()) + options.pad
 
 
 def build_control(
@@ -276,53 +301,42 @@ def build_control(
     datum : str
         Which surface is flat; see Datum.
     """
-    sheet = fitted.sheet
     foot = block_feet(fitted, points, reach=10.0)
-    prints = _footprint(sheet, foot.U, options)
-    k1, k2 = principal_curvatures(sheet.jet(prints.U))
-    curvature = np.stack([k1, -k2])
-    caps = _focal_caps(curvature, options.focal)
-    use = foot.miss < 0.5
-    reach = float(np.abs(foot.t[use]).max()) + options.pad
-    constant = not (caps < reach).any()
-    safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
-    nodes = _lifted_nodes(sheet, prints)
-    slip = sheet.grid.value(fitted.slip, prints.U)
-    flat = _safely_flat(nodes, prints, slip, (safe[0], safe[1]), flatten)
-    follow = _offsets(prints, foot, caps, options)
-    offsets = np.full_like(follow, reach) if constant else follow
-    layers = Layers(
-        nodes.mean_points,
-        nodes.mean_normal,
-        flat.flat,
-        flat.slopes[0],
-        flat.slopes[1],
-        prints.F,
-        curvature,
-        offsets[0],
-        offsets[1],
-    )
-    layers, rung, shrinks, indices = _climb(layers, follow, constant, points, options)
-    bottom, top = horizons.crossings(prints.U, slip, limit=2 * reach)
-    means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
-    flat_datum = Datum(datum, means[0], means[1])
+    columns = _columns(fitted, horizons, foot, None, flatten, options, datum)
+    reach = _reach(foot, options)
 
-    def unfolded(height: Floats) -> tuple[Floats, Floats]:
-        """Return unfolded vertices and stratigraphic coordinate at heights over the nodes."""
-        low, high = horizons.heights(prints.U - height[:, None] * slip)
-        plane = layers.flat_at(height)
-        z = flat_datum.z(height, low, high)
-        return np.column_stack([plane, z]), (height - low) / (high - low)
+    def constant() -> tuple[Columns, Layers]:
+        offsets = np.full((2, columns.count), reach)
+        return columns, columns.layers(offsets, FRACTIONS)
 
-    surfaces = {}
-    for name, height in (("mid", np.zeros(len(top))), ("top", top), ("bottom", bottom)):
-        folded = layers.P + height[:, None] * layers.normal
-        surfaces[name] = (TriMesh(folded, prints.F), TriMesh(unfolded(height)[0], prints.F))
-    T = layers.tets()
-    vertices, stratigraphic = zip(*(unfolded(q) for q in layers.heights), strict=True)
-    control = ControlMesh(
-        TetMesh(layers.folded, T),
-        TetMesh(np.concatenate(vertices), T),
-        np.concatenate(stratigraphic),
+    def capped(focal: float, slope: float) -> tuple[Columns, Layers]:
+        caps = _sloping_caps(columns, focal, slope)
+        return columns, columns.layers(_offsets(columns, foot, caps, options), FRACTIONS)
+
+    def refined() -> tuple[Columns, Layers]:
+        cell = columns.prints.cell / 2
+        finer = _columns(fitted, horizons, foot, cell, flatten, options, datum)
+        caps = _sloping_caps(finer, options.focal_refined, options.slopes[-1])
+        return finer, finer.layers(_offsets(finer, foot, caps, options), FINE_FRACTIONS)
+
+    rungs: list[tuple[str, Callable[[], tuple[Columns, Layers]]]]
+    rungs = [("capped", partial(capped, options.focal, slope)) for slope in options.slopes]
+    rungs.append(("refined", refined))
+    caps = _focal_caps(columns.curvature[:, : columns.count], options.focal)
+    if not (caps < reach).any():
+        rungs.insert(0, ("constant", constant))
+    climbed = climb(rungs, points, options.shrinks)
+    columns, laid = climbed.columns, climbed.laid
+    low, high = columns.horizons.crossings(
+        columns.prints.U, columns.slip[: columns.count], limit=2 * reach
     )
-    return SheetMesh(control, flat.flattenings, layers, rung, shrinks, surfaces, indices)
+    heights = {"mid": np.zeros(columns.count), "top": high, "bottom": low}
+    surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}
+    return SheetMesh(
+        control=laid.control(),
+        shell=laid.shell_mesh(),
+        flattenings=columns.flattenings,
+        layers=laid.layers,
+        rungs=climbed.rungs,
+        surfaces=surfaces,
+    )

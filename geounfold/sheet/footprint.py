@@ -12,6 +12,22 @@ from geounfold.sheet.surface import Sheet, normals, second_form
 
 
 @dataclass(frozen=True, eq=False)
+class Ring:
+    """Cells around a footprint, cut into triangles.
+
+    Attributes
+    ----------
+    U : (r, 2) float
+        Parameters of the nodes that the footprint has not.
+    F : (k, 3) int
+        Triangles; nodes from ``len(footprint.U)`` on are the ring's own.
+    """
+
+    U: Floats
+    F: Ints
+
+
+@dataclass(frozen=True, eq=False)
 class Footprint:
     """Square cells of the parameter plane that hold feet of blocks, cut into triangles.
 
@@ -20,7 +36,7 @@ class Footprint:
     U : (n, 2) float
         Parameters of the nodes.
     F : (m, 3) int
-        Triangles, counter-clockwise.
+        Triangles, counter-clockwise; no two parts touch in nothing but a corner.
     weight : (n,) float
         Number of blocks around each node, capped at the median: weights of registrations.
     cell_of : (b, 2) int
@@ -33,6 +49,8 @@ class Footprint:
         Unit directions of the cells' sides, as rows.
     cell : float
         Side of the cells.
+    ring : Ring
+        The cells around them.
     """
 
     U: Floats
@@ -43,6 +61,7 @@ class Footprint:
     shape: tuple[int, int]
     axes: Floats
     cell: float
+    ring: Ring
 
     def at_nodes(self, cells: Floats, reach: int) -> Floats:
         """Return a cell field as a smooth upper bound at the nodes, (n,).
@@ -81,7 +100,28 @@ def _triangles(cells: Bools) -> Ints:
     return np.concatenate([first, second])
 
 
-def footprint(U: Floats, angle: float, cell: float, dilation: int) -> Footprint:
+_CORNERED = (np.array([[1, 0], [0, 1]], dtype=bool), np.array([[0, 1], [1, 0]], dtype=bool))
+_SQUARE = np.ones((3, 3), dtype=bool)
+
+
+def _widened(cells: Bools, rings: int) -> Bools:
+    """Return cells with rings of others around them, and corners filled where only they touch.
+
+    Cells that touch in a corner alone would make a mesh whose border is no manifold.
+    """
+    out = np.asarray(ndi.binary_dilation(cells, _SQUARE, iterations=rings)) if rings else cells
+    while True:
+        fill = np.zeros_like(out)
+        for pattern in _CORNERED:
+            at = ndi.binary_hit_or_miss(out, pattern, ~pattern, origin1=-1, origin2=-1)
+            for i, j in np.argwhere(~pattern):
+                fill |= np.roll(at, (i, j), axis=(0, 1))
+        if not fill.any():
+            return out
+        out = out | fill
+
+
+def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 0) -> Footprint:
     """Return the footprint of feet U (b, 2) on a square grid turned by an angle.
 
     Parameters
@@ -94,20 +134,39 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int) -> Footprint:
         Side of the cells.
     dilation : int
         Rings of cells added around those that hold feet.
+    rings : int
+        Rings of cells around all of these, kept apart (see Ring).
     """
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     V = U @ turn
-    low = V.min(axis=0) - (2.63 + dilation) * cell  # no foot on a cell's very edge
-    shape = np.ceil((V.max(axis=0) - low) / cell).astype(int) + 3 + dilation
+    margin = dilation + rings + 1
+    low = V.min(axis=0) - (1.63 + margin) * cell  # no foot on a cell's very edge
+    shape = np.ceil((V.max(axis=0) - low) / cell).astype(int) + 2 + margin
     at = np.floor((V - low) / cell).astype(np.int64)
     count = np.bincount(at[:, 0] * shape[1] + at[:, 1], minlength=shape.prod()).reshape(shape)
     held = count > 0
-    cells = ndi.binary_dilation(held, iterations=dilation, structure=np.ones((3, 3), dtype=bool))
-    node, F = np.unique(_triangles(np.asarray(cells)), return_inverse=True)
-    i, j = np.divmod(node, shape[1] + 1)
-    nodes = (low + cell * np.stack([i, j], axis=1)) @ turn.T
+    cells = _widened(held, dilation)
+    node, F = np.unique(_triangles(cells), return_inverse=True)
     capped = np.pad(np.minimum(count, np.median(count[held])).astype(float), 1)
     around = capped[:-1, :-1] + capped[1:, :-1] + capped[:-1, 1:] + capped[1:, 1:]
-    weight = around.ravel()[node]
-    extent = (int(shape[0]), int(shape[1]))
-    return Footprint(nodes, F.reshape(-1, 3), weight, at, node, extent, turn.T, cell)
+
+    def places(nodes: Ints) -> Floats:
+        i, j = np.divmod(nodes, shape[1] + 1)
+        out: Floats = (low + cell * np.stack([i, j], axis=1)) @ turn.T
+        return out
+
+    extra = _triangles(_widened(cells, rings) & ~cells)
+    fresh = np.setdiff1d(extra, node)
+    number = np.zeros((shape + 1).prod(), dtype=np.int64)
+    number[node], number[fresh] = np.arange(len(node)), len(node) + np.arange(len(fresh))
+    return Footprint(
+        U=places(node),
+        F=F.reshape(-1, 3),
+        weight=around.ravel()[node],
+        cell_of=at,
+        node=node,
+        shape=(int(shape[0]), int(shape[1])),
+        axes=turn.T,
+        cell=cell,
+        ring=Ring(places(fresh), number[extra]),
+    )

@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from geounfold.geometry import tet_volumes, unique_edges
+from geounfold.geometry import lengths, unique_edges
 from geounfold.mesh import Floats, Ints
 from geounfold.prisms import prism_tets
 
 FRACTIONS = (-1.0, -0.6, 0.0, 0.6, 1.0)
 """Layers as shares of the offset on their side, from the bottom up."""
+
+FINE_FRACTIONS = (-1.0, -0.8, -0.6, -0.3, 0.0, 0.3, 0.6, 0.8, 1.0)
+"""The same where prisms are refined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,8 @@ class Layers:
         Curvature that makes normals converge above (row 0) and below (row 1).
     up, down : (n,) float
         Offsets: how far the mesh reaches above and below the mid surface.
+    fractions : tuple of float
+        Layers as shares of the offset on their side, from -1 at the bottom up to 1.
     """
 
     P: Floats
@@ -44,20 +49,21 @@ class Layers:
     curvature: Floats
     up: Floats
     down: Floats
+    fractions: tuple[float, ...] = FRACTIONS
 
     @property
     def heights(self) -> list[Floats]:
         """Signed height of every layer at every node, bottom first."""
-        return [f * (self.up if f >= 0 else self.down) for f in FRACTIONS]
+        return [f * (self.up if f >= 0 else self.down) for f in self.fractions]
 
     @property
     def folded(self) -> Floats:
-        """Folded vertices, layer by layer, (5 n, 3)."""
+        """Folded vertices, layer by layer, (layers n, 3)."""
         return np.concatenate([self.P + q[:, None] * self.normal for q in self.heights])
 
     @property
     def unfolded(self) -> Floats:
-        """Unfolded vertices, layer by layer, (5 n, 3); z is the height."""
+        """Unfolded vertices, layer by layer, (layers n, 3); z is the height."""
         return np.concatenate([np.column_stack([self.flat_at(q), q]) for q in self.heights])
 
     def flat_at(self, height: Floats) -> Floats:
@@ -68,24 +74,26 @@ class Layers:
 
     def tets(self) -> Ints:
         """Return the tetrahedra, right-handed where upright."""
-        return prism_tets(self.F, len(self.P), len(FRACTIONS))
+        return prism_tets(self.F, len(self.P), len(self.fractions))
 
 
-def bad_nodes(layers: Layers, T: Ints, least: float = 1e-4) -> Ints:
-    """Return the footprint nodes of tetrahedra that are inverted or nearly flat in a space.
+def bounded_slope(values: Floats, U: Floats, F: Ints, slope: float) -> Floats:
+    """Return the largest field (n,) below values that changes by no more than ``slope`` per length.
 
     Parameters
     ----------
-    layers : Layers
-        The prisms.
-    T : (m, 4) int
-        Their tetrahedra.
-    least : float
-        Least volume accepted, as a share of the median volume.
+    values : (n,) float
+        At the nodes of triangles F (m, 3) with places U (n, 2).
     """
-    v0, v1 = tet_volumes(layers.folded, T), tet_volumes(layers.unfolded, T)
-    bad = (v0 <= least * np.median(v0)) | (v1 <= least * np.median(v1))
-    return np.unique(T[bad] % len(layers.P))
+    E = unique_edges(F)
+    rise = slope * lengths(U, E)
+    out = values.copy()
+    while True:
+        before = out.copy()
+        np.minimum.at(out, E[:, 0], before[E[:, 1]] + rise)
+        np.minimum.at(out, E[:, 1], before[E[:, 0]] + rise)
+        if np.array_equal(out, before):
+            return out
 
 
 def neighbour_mean(F: Ints, n: int) -> sp.csr_array:
@@ -108,6 +116,6 @@ def shrink(layers: Layers, nodes: Ints, mean: sp.csr_array, factor: float = 0.9)
         turn = (mine > 0.3) | (mine > other + 0.1) | ((mine <= 0.3) & (other <= 0.3))
         f = np.ones(len(c))
         f[nodes[turn]] = factor
-        f = np.minimum(f, mean @ f)
+        f = np.minimum(f, 1 - mean @ (1 - f))
         offsets.append(np.maximum(c * f, 0.05))
     return replace(layers, up=offsets[0], down=offsets[1])

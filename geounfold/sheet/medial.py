@@ -14,13 +14,12 @@ from geounfold.errors import SplitError
 from geounfold.geometry import (
     face_normals,
     triangle_areas,
-    unique_edges,
     unit,
     vertex_normals,
     vertex_sum,
 )
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
-from geounfold.sheet.normal import spd_solver
+from geounfold.sheet.normal import graph_laplacian, spd_solver
 from geounfold.sheet.surface import near_any
 from geounfold.split import SurfaceSplit
 
@@ -109,16 +108,9 @@ def _harmonic_half(
             "the body may be no sheet: try --split normal or another --hull"
         )
     mean = vertex_sum(value, F, n) / np.maximum(count, 1)
-    L = _graph_laplacian(F, n)
+    L = graph_laplacian(F, n)
     K = sp.diags_array(trusted.astype(float)) + 2.0 * L + 1e-9 * sp.eye_array(n)
     return spd_solver(K)(mean), trusted
-
-
-def _graph_laplacian(F: Ints, n: int) -> sp.csr_array:
-    E = unique_edges(F)
-    half = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n)).tocsr()
-    A = sp.csr_array(half + half.T)
-    return sp.csr_array(sp.diags_array(np.asarray(A.sum(axis=1)).ravel()) - A)
 
 
 def medial_sheet(
@@ -152,7 +144,7 @@ def medial_sheet(
     faces = _one_sheet(mesh.F, np.flatnonzero(top))
     part, old = mesh.submesh(faces)
     half, trusted = _harmonic_half(split, part.F, faces, core, len(old))
-    smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * _graph_laplacian(part.F, len(old)))
+    smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
     medial = TriMesh(part.V - half[:, None] * inward, part.F)
     uv = flatten(medial, None)

@@ -17,6 +17,7 @@ import scipy.sparse.linalg as spl
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from geounfold.backends.blas import one_thread
+from geounfold.geometry import unique_edges
 from geounfold.mesh import Floats, Ints
 
 Solve = Callable[[Floats], Floats]
@@ -134,6 +135,14 @@ def spd_solver(A: sp.csr_array | sp.csc_array | sp.coo_array) -> Solve:
     )
     solve: Solve = lu.solve
     return solve
+
+
+def graph_laplacian(F: Ints, n: int) -> sp.csr_array:
+    """Return the Laplacian (n, n) of the graph of a triangulation's edges."""
+    E = unique_edges(F)
+    half = sp.coo_array((np.ones(len(E)), (E[:, 0], E[:, 1])), shape=(n, n)).tocsr()
+    A = sp.csr_array(half + half.T)
+    return sp.csr_array(sp.diags_array(np.asarray(A.sum(axis=1)).ravel()) - A)
 
 
 def coupled_solver(first: Stencils, second: Stencils, cross: sp.csr_array, ridge: float) -> Solve:

@@ -14,7 +14,7 @@ from geounfold.mesh import Bools, Floats, TriMesh
 from geounfold.synthetic.outline import Even, Place, Region, Thickness
 from geounfold.synthetic.profile import FlexuralSlip, Profile, require_finite, require_positive
 
-GRIDS = ("before", "after")
+GRIDS = ("before", "after", "scattered")
 
 
 def rotation(bearing: float, plunge: float, dip: float) -> Floats:
@@ -59,9 +59,10 @@ class FoldSpec:
     outline : tuple of regions
         Ellipse, Hole, Ragged, Embayment, ObliqueCut, Neck, Gap; the body lies in all of them.
     steps : (float, float, float)
-        Block sides along the lattice's axes.
-    grid : {'before', 'after'}
-        Blocks are regular before folding, or after it (as a block model's are).
+        Block sides along the lattice's axes; of scattered points, one for each such block's volume.
+    grid : {'before', 'after', 'scattered'}
+        Blocks are regular before folding, or after it (as a block model's are), or points are
+        scattered at random without a lattice.
     azimuth, plunge, tilt : float
         Of the fold axis, as bearing, plunge and dip of ``rotation``; degrees.
     lattice_bearing, lattice_plunge, lattice_dip : float
@@ -81,6 +82,14 @@ class FoldSpec:
     refold : Profile or None
         A second fold, about the axis across the first one.  No exact flattening exists then;
         the truth keeps volume, not lengths.
+    sub_blocks : {1, 2, 4, 8}
+        Blocks that the body's surface crosses are halved along every axis, and halved again
+        until so many stand on a side: ``steps`` are those of the parent blocks then.
+    density : float
+        Of scattered points: the highest over the lowest, from 1 up.
+    closed : bool
+        The profile ends where it starts, as a tube's does, and the body is whole there.  No flat
+        image exists without a cut; the truth is that of the tube cut along the normals there.
 
     Raises
     ------
@@ -109,6 +118,9 @@ class FoldSpec:
     pin: float | None = None
     origin: float = 0.0
     refold: Profile | None = None
+    sub_blocks: int = 1
+    density: float = 1.0
+    closed: bool = False
 
     def __post_init__(self) -> None:
         require_positive("length", self.length)
@@ -129,6 +141,21 @@ class FoldSpec:
         if not isinstance(self.seed, int) or self.seed < 0:
             raise OptionError(f"seed must be a whole number from 0 up, not {self.seed!r}")
         self._check_parts()
+        self._check_grid()
+
+    def _check_grid(self) -> None:
+        if self.sub_blocks not in (1, 2, 4, 8):
+            raise OptionError(f"sub_blocks is not one of: 1, 2, 4, 8, but {self.sub_blocks!r}")
+        if self.sub_blocks != 1 and self.grid != "after":
+            raise OptionError(f"sub_blocks need the grid 'after', not {self.grid!r}")
+        require_finite("density", self.density)
+        if self.density < 1:
+            raise OptionError(f"density is a ratio and must be 1 or more, not {self.density!r}")
+        if self.density != 1 and self.grid != "scattered":
+            raise OptionError(f"a density needs the grid 'scattered', not {self.grid!r}")
+        plain = self.grid == "after" and self.refold is None and isinstance(self.shape, Even)
+        if self.closed and not plain:
+            raise OptionError("a closed body must be gridded after one fold and evenly thick")
 
     def _check_parts(self) -> None:
         for name in ("profile", "refold"):
@@ -157,8 +184,9 @@ class FoldSpec:
 
     @property
     def developable(self) -> bool:
-        """Whether an exact flattening exists: unless folded twice."""
-        return self.refold is None or not (self.refold.elements and self.profile.elements)
+        """Whether an exact flattening exists: unless folded twice, or closed."""
+        twice = self.refold is not None and self.refold.elements and self.profile.elements
+        return not (twice or self.closed)
 
     def with_options(self, **overrides: object) -> FoldSpec:
         """Return a copy with other values of some fields, or OptionError naming the valid ones."""
@@ -174,12 +202,13 @@ class FoldSpec:
     def with_blocks(self, blocks: int) -> FoldSpec:
         """Return the body grown or shrunk in its plane to hold about so many blocks.
 
-        Length and width are scaled; sinusoids go on, bends and bumps are stretched.
+        Length and width are scaled; sinusoids go on, bends and bumps are stretched.  Of a
+        sub-blocked body the parents are counted, those at the surface by their part of a block.
         """
         require_positive("blocks", blocks)
         spec = self
         for _ in range(3):
-            factor = float(np.sqrt(blocks * np.prod(spec.steps) / _volume(spec)))
+            factor = float(np.sqrt(blocks * np.prod(spec.steps) / volume(spec)))
             spec = replace(
                 spec,
                 length=spec.length * factor,
@@ -190,16 +219,16 @@ class FoldSpec:
         return spec
 
 
-def _volume(spec: FoldSpec) -> float:
+def volume(spec: FoldSpec) -> float:
     """Return the body's volume, by the midpoint rule over the sheet."""
     n = 400
     a, b = ((g.ravel() + 0.5) / n for g in np.meshgrid(*[np.arange(n)] * 2, indexing="ij"))
     low, high = spec.shape.heights(a, b)
     thick = np.where(_kept(spec, a * spec.length, b * spec.width, np.zeros(len(a))), high - low, 0)
-    volume = float(thick.mean() * spec.length * spec.width)
-    if volume <= 0:
+    out = float(thick.mean() * spec.length * spec.width)
+    if out <= 0:
         raise OptionError("the outline leaves nothing of the body")
-    return volume
+    return out
 
 
 def _kept(spec: FoldSpec, u: Floats, v: Floats, w: Floats) -> Bools:
@@ -221,12 +250,15 @@ class Sheet:
     Raises
     ------
     OptionError
-        When made: a hinge tighter than the sheet is thick, or limbs that overlap.
+        When made: a hinge tighter than the sheet is thick, limbs that overlap, or a closed
+        sheet whose ends do not meet.
     """
 
     spec: FoldSpec
 
     def __post_init__(self) -> None:
+        if self.spec.closed:
+            self._check_closed()
         self._check_hinges(self.slip, self.spec.shape)
         if self.second is not None:
             self._check_hinges(self.second, Even(2 * self.second.reach))
@@ -250,7 +282,7 @@ class Sheet:
         """The fold's section, between (u, w) and (x, z)."""
         s = self.spec
         pin = None if s.pin is None else float(np.radians(s.pin))
-        return FlexuralSlip(s.profile, s.length, s.shape.reach(), pin, s.origin)
+        return FlexuralSlip(s.profile, s.length, s.shape.reach(), pin, s.origin, s.closed)
 
     @cached_property
     def second(self) -> FlexuralSlip | None:
@@ -277,7 +309,9 @@ class Sheet:
         """Return which points (n, 3) in truth coordinates lie in the body."""
         u, v, w = truth.T
         low, high = self.heights(u, v)
-        out: Bools = _kept(self.spec, u, v, w) & (w >= low) & (w <= high)
+        # A closed sheet ends at normals: the part of the length whose normal a point stands on.
+        along = self.slip.arc_length(u, w) if self.spec.closed else u
+        out: Bools = _kept(self.spec, along, v, w) & (w >= low) & (w <= high)
         return out
 
     def heights(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -326,13 +360,33 @@ class Sheet:
         return truth, found
 
     def boundary(self, n: int = 200, m: int = 9) -> Floats:
-        """Return truth coordinates (2 n m, 3) of bottom and top over the whole rectangle."""
+        """Return truth coordinates (2 n m, 3) of bottom and top over the whole sheet."""
+        # The ends of a closed sheet are one place: stay half a step away from it.
+        short = self.spec.length / (2 * n) if self.spec.closed else 0.0
         u, v = np.meshgrid(
-            np.linspace(0, self.spec.length, n), np.linspace(0, self.spec.width, m), indexing="ij"
+            np.linspace(short, self.spec.length - short, n),
+            np.linspace(0, self.spec.width, m),
+            indexing="ij",
         )
         low, high = self.heights(u.ravel(), v.ravel())
-        sides = [np.stack([u.ravel(), v.ravel(), w], axis=1) for w in (low, high)]
+        sides = [self.over(u.ravel(), v.ravel(), w) for w in (low, high)]
         return np.concatenate(sides)
+
+    def over(self, along: Floats, v: Floats, w: Floats) -> Floats:
+        """Return truth coordinates (n, 3) over places on the sheet: u, or s of a closed one."""
+        u = self.slip.slipped(along, w) if self.spec.closed else along
+        return np.stack([u, v, w], axis=1)
+
+    def _check_closed(self) -> None:
+        """Raise OptionError unless the profile's ends meet, in one direction."""
+        ends = np.array([0.0, self.spec.length])
+        gap = float(np.linalg.norm(np.diff(self.slip.points(ends), axis=0)))
+        turns = float(np.diff(self.spec.profile.heading(ends))[0]) / (2 * np.pi)
+        if gap > 1e-9 * self.spec.length or np.abs(np.abs(turns) - 1) > 1e-9:
+            raise OptionError(
+                f"a closed body's profile must end where it starts after one turn, but ends "
+                f"{gap:.4g} away after {turns:.4g} turns; make the length that of the closed curve"
+            )
 
     def _check_hinges(self, slip: FlexuralSlip, shape: Thickness) -> None:
         """Raise OptionError where the sheet reaches a centre of curvature."""
@@ -382,7 +436,9 @@ class Body:
     bottom, top : (n,) float
         Heights w of the body's surfaces below and above each block.
     steps : (3,) float
-        Block sides along the lattice's axes.
+        Block sides along the lattice's axes; of a sub-blocked body, the parents'.
+    sizes : (n, 3) float
+        Each block's own sides along the lattice's axes.
     sheet : Sheet
         The exact map, for any other points.
     """
@@ -393,6 +449,7 @@ class Body:
     bottom: Floats
     top: Floats
     steps: Floats
+    sizes: Floats
     sheet: Sheet
 
     def __iter__(self) -> Iterator[Floats]:
@@ -416,9 +473,14 @@ class Body:
         return out
 
     def frame(self, decimals: int | None = None) -> pd.DataFrame:
-        """Return a table: centroid_x/y/z, true_x/y/z; a row per block, rounded on request."""
+        """Return a table: centroid_x/y/z, true_x/y/z; a row per block, rounded on request.
+
+        Where blocks differ in size, dim_x/y/z are their sides along the lattice's axes.
+        """
         data = {f"centroid_{c}": self.folded[:, i] for i, c in enumerate("xyz")}
         data.update({f"true_{c}": self.truth[:, i] for i, c in enumerate("xyz")})
+        if (self.sizes != self.sizes[:1]).any():
+            data.update({f"dim_{c}": self.sizes[:, i] for i, c in enumerate("xyz")})
         table = pd.DataFrame(data)
         return table if decimals is None else table.round(decimals) + 0.0
 
@@ -437,12 +499,14 @@ class Body:
         require_positive("spacing", spacing)
         spec = self.sheet.spec
         n, m = (max(2, round(x / spacing) + 1) for x in (spec.length, spec.width))
-        u, v = np.meshgrid(
+        grid = np.meshgrid(
             np.linspace(0, spec.length, n), np.linspace(0, spec.width, m), indexing="ij"
         )
-        heights = self.sheet.heights(u.ravel(), v.ravel())
-        truth = np.stack([u.ravel(), v.ravel(), heights[side == "top"]], axis=1)
-        kept = _kept(spec, *truth.T) & (heights[1] > heights[0])
+        u, v = grid[0].ravel(), grid[1].ravel()
+        heights = self.sheet.heights(u, v)
+        w = heights[side == "top"]
+        truth = self.sheet.over(u, v, w)
+        kept = _kept(spec, u, v, w) & (heights[1] > heights[0])
         k = np.arange(len(truth)).reshape(n, m)
         p, q, r, s = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
         F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
 from geounfold.errors import OptionError
 from geounfold.synthetic.body import Body, FoldSpec
 from geounfold.synthetic.outline import (
@@ -245,6 +247,143 @@ _CASES = {
         missing=0.05,
         seed=11,
         outline=(Gap("v", 190, 200),),
+    ),
+    "fanned": FoldSpec(
+        description="fan fold: overturned limbs that converge at 50 degrees below the crest",
+        profile=Profile(
+            elements=(
+                Bend(at=200, change=115, radius=90),
+                Bend(at=600, change=-115, radius=90),
+                Bend(at=900, change=-115, radius=90),
+                Bend(at=1300, change=115, radius=90),
+            )
+        ),
+        length=1500,
+        width=240,
+        thickness=80,
+    ),
+    "refolded_tight": FoldSpec(
+        description="folded twice, limbs at 40 and 25 degrees: no exact flattening exists",
+        profile=Profile(elements=(Sinusoid(amplitude=40, wavelength=800),)),
+        refold=Profile(elements=(Sinusoid(amplitude=25, wavelength=900),)),
+        length=800,
+        width=600,
+        thickness=60,
+    ),
+    "sharp_hinge": FoldSpec(
+        description="hinge radius 42 at a half-thickness of 40",
+        profile=Profile(start=50, elements=(Bend(at=350, change=-100, radius=42),)),
+        length=700,
+        width=360,
+        thickness=80,
+    ),
+    "touching": FoldSpec(
+        description="folded through 220 degrees, the limbs' ends 1.6 blocks apart",
+        profile=Profile(start=110, elements=(Bend(at=290, change=-220, radius=90),)),
+        length=580,
+        width=320,
+        thickness=80,
+    ),
+    "cylinder": FoldSpec(
+        description="closed tube: no flat image without a cut; truth is the tube cut open",
+        profile=Profile(
+            start=180,
+            elements=(Bend(at=150 * np.pi, change=-360, radius=150, shape="arc"),),
+        ),
+        length=300 * np.pi,
+        width=240,
+        thickness=60,
+        closed=True,
+    ),
+    "oblique_rims": FoldSpec(
+        description="all four sides cut 30 to 55 degrees from the layers' normal",
+        profile=_OPEN,
+        length=900,
+        width=520,
+        thickness=80,
+        outline=(
+            ObliqueCut(50, "u0", setback=60),
+            ObliqueCut(-40, "u1", setback=60),
+            ObliqueCut(-55, "v0", setback=70),
+            ObliqueCut(30, "v1", setback=40),
+        ),
+    ),
+    "strip": FoldSpec(
+        description="strip as wide as the layer is thick",
+        profile=_OPEN,
+        length=1800,
+        width=80,
+        thickness=80,
+    ),
+    "one_block": FoldSpec(
+        description="sheet one block thick",
+        profile=_OPEN,
+        length=1300,
+        width=900,
+        thickness=10,
+    ),
+    "two_blocks": FoldSpec(
+        description="sheet two blocks thick",
+        profile=_OPEN,
+        length=1200,
+        width=800,
+        thickness=20,
+    ),
+    "plates": FoldSpec(
+        description="blocks of 40 x 40 x 4",
+        profile=_OPEN,
+        length=1600,
+        width=1200,
+        thickness=60,
+        steps=(40, 40, 4),
+    ),
+    "slats": FoldSpec(
+        description="blocks of 40 x 4 x 8, longest across the fold",
+        profile=_OPEN,
+        length=820,
+        width=320,
+        thickness=80,
+        steps=(40, 4, 8),
+    ),
+    "rotated_plates": FoldSpec(
+        description="lattice turned by 27, 12 and 8 degrees, blocks of 30 x 20 x 5",
+        profile=_OPEN,
+        length=1000,
+        width=800,
+        thickness=80,
+        azimuth=60,
+        steps=(30, 20, 5),
+        lattice_bearing=27,
+        lattice_plunge=12,
+        lattice_dip=8,
+    ),
+    "sub_blocked": FoldSpec(
+        description="parent blocks of 40 split in 2, 4 and 8 along each side near the surface",
+        profile=_OPEN,
+        length=820,
+        width=400,
+        thickness=130,
+        steps=(40, 40, 40),
+        sub_blocks=8,
+    ),
+    "scattered": FoldSpec(
+        description="random points without a lattice, their density varying 5-fold",
+        profile=_OPEN,
+        length=820,
+        width=400,
+        thickness=90,
+        grid="scattered",
+        density=5,
+        seed=5,
+    ),
+    "noisier": FoldSpec(
+        description="centroids disturbed by 0.2 blocks",
+        profile=_OPEN,
+        length=820,
+        width=360,
+        thickness=100,
+        noise=0.2,
+        seed=8,
     ),
     "thin_wide": FoldSpec(
         description="wide sheet 3.3 blocks thick, 175,825 blocks",

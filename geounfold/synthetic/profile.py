@@ -305,6 +305,8 @@ class FlexuralSlip:
         Heading, radians, at which layers do not slip; None for the mean over the length.
     origin : float
         Arc length whose point is x = z = 0.
+    closed : bool
+        The mid curve ends where it starts: points have their feet in ``[0, length]``.
     """
 
     profile: Profile
@@ -312,6 +314,7 @@ class FlexuralSlip:
     reach: float
     pin: float | None = None
     origin: float = 0.0
+    closed: bool = False
 
     @cached_property
     def still(self) -> float:
@@ -342,6 +345,9 @@ class FlexuralSlip:
     @cached_property
     def _feet(self) -> tuple[cKDTree, Floats]:
         """Return a tree of mid-curve samples that the sheet covers, and their arc lengths."""
+        if self.closed:
+            s = self._cut(0.0, self.length)
+            return cKDTree(self.points(s)), s
         heights = np.linspace(-self.reach, self.reach, 33)
         ends = [self.arc_length(np.full(33, u), heights) for u in (0.0, self.length)]
         spare = 2 * float(np.diff(self.knots).max())
@@ -389,6 +395,11 @@ class FlexuralSlip:
         guess = u + w * (self.profile.heading(u) - self.still)
         return bracketed_newton(residual, u - bound, u + bound, guess, 1e-14 * self.length)
 
+    def slipped(self, s: Floats, w: Floats) -> Floats:
+        """Return u (n,) of points at heights w (n,) on the normals at arc lengths s (n,)."""
+        out: Floats = s - w * (self.profile.heading(s) - self.still)
+        return out
+
     def fold(self, u: Floats, w: Floats) -> Floats:
         """Return the folded points (x, z), (n, 2), of points (u, w), each (n,)."""
         s = self.arc_length(u, w)
@@ -415,8 +426,7 @@ class FlexuralSlip:
         good &= 1 - t * self.profile.curvature(s) > 0
         found[rows] = good
         out = np.zeros((len(xz), 2))
-        u = s - t * (self.profile.heading(s) - self.still)
-        out[rows[good]] = np.stack([u[good], t[good]], axis=1)
+        out[rows[good]] = np.stack([self.slipped(s, t)[good], t[good]], axis=1)
         return out, found
 
     def _offsets(self, xz: Floats, s: Floats) -> tuple[Floats, Floats]:

@@ -1,20 +1,35 @@
-"""Blocks of a simulated body, gridded before or after folding."""
+"""Blocks of a simulated body, gridded before or after folding, or scattered."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats, Ints
-from geounfold.synthetic.body import Body, FoldSpec, Sheet
+from geounfold.mesh import Bools, Floats, Ints
+from geounfold.synthetic.body import Body, FoldSpec, Sheet, volume
 
 _CHUNK = 400_000  # candidates handled at a time: bounds the memory beside the result
 
 
+class _Blocks(NamedTuple):
+    """Some of a body's blocks: folded and true centroids, and sides, (n, 3) each."""
+
+    folded: Floats
+    truth: Floats
+    sizes: Floats
+
+    def take(self, rows: Bools | Ints) -> _Blocks:
+        return _Blocks(*(part[rows] for part in self))
+
+
 def sample(name: str, spec: FoldSpec) -> Body:
-    """Return a body's blocks, lattice order: x slowest, z fastest.
+    """Return a body's blocks.
+
+    Those of a lattice come in its order, x slowest and z fastest; sub-blocks in that of their
+    centroids; scattered points in none.
 
     Raises
     ------
@@ -22,29 +37,54 @@ def sample(name: str, spec: FoldSpec) -> Body:
         No block fits in the body, or the body is geometrically impossible (see Sheet).
     """
     sheet = Sheet(spec)
-    chunks = _before(sheet) if spec.grid == "before" else _after(sheet)
-    pairs = list(chunks)
-    if not sum(len(truth) for _, truth in pairs):
+    make = {"before": _before, "after": _after, "scattered": _scattered}[spec.grid]
+    chunks = list((_sub_blocked if spec.sub_blocks > 1 else make)(sheet))
+    if not sum(len(chunk.truth) for chunk in chunks):
         raise OptionError(f"no block of {name} lies in the body; make steps smaller")
-    folded = np.concatenate([pair[0] for pair in pairs])
-    truth = np.concatenate([pair[1] for pair in pairs])
-    del pairs
-    folded, truth = _damage(sheet, folded, truth)
+    blocks = _Blocks(*(np.concatenate(parts) for parts in zip(*chunks, strict=True)))
+    del chunks
+    folded, truth, sizes = _damage(sheet, blocks)
     bottom, top = sheet.heights(truth[:, 0], truth[:, 1])
-    return Body(name, folded, truth, bottom, top, np.array(spec.steps, float), sheet)
+    return Body(name, folded, truth, bottom, top, np.array(spec.steps, float), sizes, sheet)
 
 
-def _damage(sheet: Sheet, folded: Floats, truth: Floats) -> tuple[Floats, Floats]:
+def _damage(sheet: Sheet, blocks: _Blocks) -> _Blocks:
     """Return the blocks after some are lost and the others' centroids disturbed."""
     spec = sheet.spec
     rng = np.random.default_rng(spec.seed)
     if spec.missing:
-        kept = rng.random(len(truth)) >= spec.missing
-        folded, truth = folded[kept], truth[kept]
+        blocks = blocks.take(rng.random(len(blocks.truth)) >= spec.missing)
     if spec.noise:
-        sides = spec.noise * np.array(spec.steps)
-        folded = folded + (rng.standard_normal(folded.shape) * sides) @ sheet.lattice_axes
-    return folded, truth
+        shifts = rng.standard_normal(blocks.folded.shape) * (spec.noise * blocks.sizes)
+        blocks = blocks._replace(folded=blocks.folded + shifts @ sheet.lattice_axes)
+    return blocks
+
+
+def _same(spec: FoldSpec, folded: Floats, truth: Floats) -> _Blocks:
+    """Return blocks that all have the sides ``steps``."""
+    return _Blocks(folded, truth, np.broadcast_to(np.array(spec.steps, float), truth.shape))
+
+
+def _scattered(sheet: Sheet) -> Iterator[_Blocks]:
+    """Yield random points, one for each block's volume, denser in two corners of the sheet.
+
+    Folding keeps volumes, so points scattered before it are as dense afterwards.
+    """
+    spec = sheet.spec
+    rng = np.random.default_rng([spec.seed, 1])
+    wanted = round(volume(spec) / float(np.prod(spec.steps)))
+    reach = spec.shape.reach()
+    for _ in range(1000):
+        if not wanted:
+            return
+        a, b, c, chance = rng.random((4, 4 * wanted + 1000))
+        truth = np.stack([a * spec.length, b * spec.width, (2 * c - 1) * reach], axis=1)
+        share = (1 + np.sin(2 * np.pi * a) * np.cos(np.pi * b)) / 2  # 0 sparse, 1 dense
+        kept = sheet.inside(truth) & (chance <= spec.density ** (share - 1))
+        truth = truth[kept][:wanted]
+        wanted -= len(truth)
+        yield _same(spec, sheet.fold(truth), truth)
+    raise OptionError("the body fills too little of its length and width to scatter points in it")
 
 
 def _slabs(counts: tuple[int, int, int]) -> Iterator[tuple[int, int]]:
@@ -53,8 +93,8 @@ def _slabs(counts: tuple[int, int, int]) -> Iterator[tuple[int, int]]:
     return ((i, min(i + rows, counts[0])) for i in range(0, counts[0], rows))
 
 
-def _before(sheet: Sheet) -> Iterator[tuple[Floats, Floats]]:
-    """Yield folded and true points of a grid that is regular before folding."""
+def _before(sheet: Sheet) -> Iterator[_Blocks]:
+    """Yield blocks of a grid that is regular before folding."""
     spec = sheet.spec
     extents = (spec.length, spec.width, 2 * spec.shape.reach())
     nu, nv, nw = (int(x / h + 1e-9) for x, h in zip(extents, spec.steps, strict=True))
@@ -68,7 +108,7 @@ def _before(sheet: Sheet) -> Iterator[tuple[Floats, Floats]]:
         kept = sheet.inside(truth)
         x, z = section[lo + i[kept], k[kept]].T
         local = np.stack([x, truth[kept, 1], z], axis=1)
-        yield sheet.to_world(sheet.refold(local)), truth[kept]
+        yield _same(spec, sheet.to_world(sheet.refold(local)), truth[kept])
 
 
 def _indices(*counts: int) -> tuple[Ints, ...]:
@@ -76,13 +116,55 @@ def _indices(*counts: int) -> tuple[Ints, ...]:
     return tuple(g.ravel() for g in np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"))
 
 
-def _after(sheet: Sheet) -> Iterator[tuple[Floats, Floats]]:
-    """Yield folded and true points of a lattice that is regular after folding."""
+def _after(sheet: Sheet) -> Iterator[_Blocks]:
+    """Yield blocks of a lattice that is regular after folding."""
+    steps = np.array(sheet.spec.steps, float)
+    for cells, truth in _inside(sheet, steps):
+        yield _same(sheet.spec, _centroids(sheet, cells, steps), truth)
+
+
+def _sub_blocked(sheet: Sheet) -> Iterator[_Blocks]:
+    """Yield parent blocks that lie in the body whole, and smaller blocks near its surface.
+
+    A block lies in the body when its middle and those of all smallest blocks in it do.
+    """
+    spec = sheet.spec
+    steps = np.array(spec.steps, float)
+    fine = steps / spec.sub_blocks
+    cells, truth = (np.concatenate(part) for part in zip(*_inside(sheet, fine), strict=True))
+    found = []
+    side = spec.sub_blocks
+    while side > 1:
+        blocks, group, count = np.unique(
+            cells // side, axis=0, return_inverse=True, return_counts=True
+        )
+        centroids = _centroids(sheet, blocks, fine * side)
+        middles, whole = sheet.unfold(centroids)
+        whole &= (count == side**3) & sheet.inside(middles)
+        sizes = np.broadcast_to(fine * side, (len(blocks), 3))
+        found.append(_Blocks(centroids, middles, sizes).take(whole))
+        left = ~whole[group.ravel()]
+        cells, truth = cells[left], truth[left]
+        side //= 2
+    sizes = np.broadcast_to(fine, (len(cells), 3))
+    found.append(_Blocks(_centroids(sheet, cells, fine), truth, sizes))
+    out = _Blocks(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    place = np.rint((out.folded - spec.offset) @ sheet.lattice_axes.T / fine * 2)
+    yield out.take(np.lexsort(place.T[::-1]))
+
+
+def _centroids(sheet: Sheet, cells: Ints, steps: Floats) -> Floats:
+    """Return world coordinates (n, 3) of the middles of lattice cells (n, 3)."""
+    out: Floats = (cells + 0.5) * steps @ sheet.lattice_axes + np.asarray(sheet.spec.offset, float)
+    return out
+
+
+def _inside(sheet: Sheet, steps: Floats) -> Iterator[tuple[Ints, Floats]]:
+    """Yield the cells (n, 3) of a lattice whose middles lie in the body, and their truth."""
     spec = sheet.spec
     turn = sheet.lattice_axes @ sheet.axes.T  # rows: lattice axes in the fold's own frame
     if spec.lattice_bearing == spec.azimuth and spec.lattice_plunge == spec.plunge:
         turn[1], turn[:, 1] = (0, 1, 0), (0, 1, 0)
-    steps = np.array(spec.steps, float)
     box = sheet.fold_local(sheet.boundary()) @ turn.T / steps
     first = np.floor(box.min(axis=0)).astype(int) - 1
     counts = tuple((np.ceil(box.max(axis=0)).astype(int) + 1 - first).tolist())
@@ -90,8 +172,7 @@ def _after(sheet: Sheet) -> Iterator[tuple[Floats, Floats]]:
     along = turn[1, 1] == 1 and spec.refold is None
     for i, j, k, truth in (_columns if along else _points)(sheet, axes, turn):
         kept = sheet.inside(truth)
-        lattice = np.stack([axes[0][i[kept]], axes[1][j[kept]], axes[2][k[kept]]], axis=1)
-        yield lattice @ sheet.lattice_axes + np.asarray(spec.offset, float), truth[kept]
+        yield np.stack([i[kept], j[kept], k[kept]], axis=1) + first, truth[kept]
 
 
 _Candidates = Iterator[tuple[Ints, Ints, Ints, Floats]]

@@ -3,7 +3,7 @@
 # system libraries that README.md names.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env demo test test-all check format bench notebooks accept clean
+.PHONY: help env demo test test-all check format bench soak notebooks accept clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -13,6 +13,7 @@ EXTRAS := dev,notebooks
 ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+SOAK_ARGS ?=
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*  ## ' $(MAKEFILE_LIST) | awk -F ':.*  ## ' '{printf "%-12s%s\n", $$1, $$2}'
@@ -61,6 +62,9 @@ format: $(STAMP)  ## put the code into the standard format
 
 bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
+
+soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
+	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
 
 notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each whole
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py

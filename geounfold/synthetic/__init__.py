@@ -17,10 +17,12 @@ from geounfold.synthetic.outline import (
     Wedge,
 )
 from geounfold.synthetic.profile import Bend, Bump, FlexuralSlip, Profile, Sinusoid
+from geounfold.synthetic.recipes import FAMILIES, random_body, random_family
 from geounfold.synthetic.surfaces import AnalyticSurface, cone, cylinder, slab, spherical_cap
 
 __all__ = [
     "CASES",
+    "FAMILIES",
     "AnalyticSurface",
     "Bend",
     "Body",
@@ -44,6 +46,8 @@ __all__ = [
     "Wedge",
     "cone",
     "cylinder",
+    "random_body",
+    "random_family",
     "simulate",
     "slab",
     "spherical_cap",

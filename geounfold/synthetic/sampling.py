@@ -135,15 +135,13 @@ def _sub_blocked(sheet: Sheet) -> Iterator[_Blocks]:
     found = []
     side = spec.sub_blocks
     while side > 1:
-        blocks, group, count = np.unique(
-            cells // side, axis=0, return_inverse=True, return_counts=True
-        )
+        blocks, group, count = _grouped(cells // side)
         centroids = _centroids(sheet, blocks, fine * side)
         middles, whole = sheet.unfold(centroids)
         whole &= (count == side**3) & sheet.inside(middles)
         sizes = np.broadcast_to(fine * side, (len(blocks), 3))
         found.append(_Blocks(centroids, middles, sizes).take(whole))
-        left = ~whole[group.ravel()]
+        left = ~whole[group]
         cells, truth = cells[left], truth[left]
         side //= 2
     sizes = np.broadcast_to(fine, (len(cells), 3))
@@ -151,6 +149,16 @@ def _sub_blocked(sheet: Sheet) -> Iterator[_Blocks]:
     out = _Blocks(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
     place = np.rint((out.folded - spec.offset) @ sheet.lattice_axes.T / fine * 2)
     yield out.take(np.lexsort(place.T[::-1]))
+
+
+def _grouped(cells: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return the different rows of cells (n, 3), each row's place among them, and their counts."""
+    low = cells.min(axis=0, initial=0)
+    shape = tuple((cells.max(axis=0, initial=0) - low + 1).tolist())
+    keys, group, count = np.unique(
+        np.ravel_multi_index(tuple((cells - low).T), shape), return_inverse=True, return_counts=True
+    )
+    return np.stack(np.unravel_index(keys, shape), axis=1) + low, group, count
 
 
 def _centroids(sheet: Sheet, cells: Ints, steps: Floats) -> Floats:

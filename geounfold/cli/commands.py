@@ -48,6 +48,7 @@ def unfold(args: Namespace, console: Console) -> None:
         },
         _given(args.points, args.samples, args.top, args.bottom),
         overwrite=args.overwrite,
+        watcher=console.journal,
     )
     if args.report is not None:
         _check_pictures(console)
@@ -95,6 +96,7 @@ def carry(args: Namespace, console: Console) -> None:
         {"--output": (args.output, TABLE_ENDINGS)},
         [args.map, args.points],
         overwrite=args.overwrite,
+        watcher=console.journal,
     )
     existing_file(Path(args.map))
     table = _read(args.points, args, console, prefer=(_UNFOLDED,) if args.inverse else ())
@@ -134,7 +136,10 @@ def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> No
 def compare(args: Namespace, console: Console) -> None:
     """Try flatteners on one body or surface and write a table of how they did."""
     outputs = Outputs.planned(
-        {"--output": (args.output, TABLE_ENDINGS)}, [args.points], overwrite=args.overwrite
+        {"--output": (args.output, TABLE_ENDINGS)},
+        [args.points],
+        overwrite=args.overwrite,
+        watcher=console.journal,
     )
     names = [name.strip() for name in args.flatteners.split(",")]
     chosen: str | list[str] = "all" if names == ["all"] else names
@@ -168,6 +173,7 @@ def quality(args: Namespace, console: Console) -> None:
         {"--output": (args.output, _JSON)},
         _given(args.folded, args.unfolded, args.truth),
         overwrite=args.overwrite,
+        watcher=console.journal,
     )
     folded = read_points(args.folded, _triple(args.columns))
     unfolded = read_points(args.unfolded, _triple(args.unfolded_columns), prefer=(_UNFOLDED,))
@@ -210,7 +216,11 @@ def simulate(args: Namespace, console: Console) -> None:
     if args.case is None or args.output is None:
         raise OptionError("simulate needs CASE and -o OUT, or --list")
     blocks = _count(args.blocks, "--blocks")
-    outputs = Outputs.planned({"--output": (args.output, TABLE_ENDINGS)}, overwrite=args.overwrite)
+    outputs = Outputs.planned(
+        {"--output": (args.output, TABLE_ENDINGS)},
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
     console.stage("simulating")
     body = synthetic.simulate(args.case, blocks=blocks)
     frame = body.frame(4)
@@ -222,7 +232,10 @@ def simulate(args: Namespace, console: Console) -> None:
 def view(args: Namespace, console: Console) -> None:
     """Draw a saved map's control mesh, or points: folded and unfolded where a table has both."""
     outputs = Outputs.planned(
-        {"--output": (args.output, _PICTURE)}, [args.points], overwrite=args.overwrite
+        {"--output": (args.output, _PICTURE)},
+        [args.points],
+        overwrite=args.overwrite,
+        watcher=console.journal,
     )
     if ending(Path(args.points)) in _MAP:
         if args.colour is not None:

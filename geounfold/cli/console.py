@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import suppress
 from typing import TextIO
+
+from geounfold.cli.journal import Journal
 
 
 class Console:
@@ -16,12 +19,26 @@ class Console:
         Neither progress nor warnings.
     stream : text stream, optional
         Instead of stderr.
+    journal : Journal, optional
+        Where outputs are noted; nobody reads it without.
+
+    Attributes
+    ----------
+    journal : Journal
+        As given.
     """
 
-    def __init__(self, *, quiet: bool = False, stream: TextIO | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        quiet: bool = False,
+        stream: TextIO | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self.journal = journal or Journal()
         self._stream = sys.stderr if stream is None else stream
         self._quiet = quiet
-        self._live = not quiet and self._stream.isatty()
+        self._live = not quiet and self._stream is not None and self._stream.isatty()
         self._since = time.perf_counter()
 
     def stage(self, name: str) -> None:
@@ -52,8 +69,11 @@ class Console:
             self._write("\r\x1b[K")
 
     def _write(self, text: str) -> None:
-        self._stream.write(text)
-        self._stream.flush()
+        """Write a message; one that cannot be shown (stderr closed, full) is no reason to fail."""
+        if self._stream is not None:
+            with suppress(OSError, ValueError):
+                self._stream.write(text)
+                self._stream.flush()
 
 
 def _one_line(text: str) -> str:

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
-import signal
+import re
 import sys
-import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import FrameType
 
 from geounfold.cli.console import Console
+from geounfold.cli.journal import Journal
 from geounfold.cli.parser import parse
+from geounfold.cli.stops import STOPS, ignore_stops, stop_of, stoppable
+from geounfold.cli.supervise import memory_is_limited, supervised
 from geounfold.errors import GeounfoldError
 
-_INTERRUPTED = 128 + signal.SIGINT
-_TERMINATED = 128 + signal.SIGTERM
-
-
-class _TerminatedError(BaseException):
-    """SIGTERM, so that what was begun is cleared away."""
+_NO_MEMORY = re.compile(
+    r"cannot allocate memory|failed to map segment|bad[_ ]alloc|out of memory|unable to allocate"
+    r"|can't start new thread|insufficient memory",
+    re.IGNORECASE,
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -30,40 +31,99 @@ def main(argv: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     argv : sequence of str, optional
-        The arguments; those of the process without.
+        The arguments. Without, those of the process, and the run has a process of its own (see
+        `supervised`).
 
     Returns
     -------
     int
-        0 done, 2 input or options at fault, 1 anything else, 130 interrupted, 143 terminated.
+        0 done, 2 input or options at fault, 1 anything else, 130 interrupted, 143 terminated,
+        129 hung up.
     """
-    words = sys.argv[1:] if argv is None else list(argv)
-    console = Console(quiet="--quiet" in words)
+    if argv is not None:
+        with stoppable():
+            return _guarded(list(argv), Journal(), lambda: None)
+    words = sys.argv[1:]
+    return supervised(
+        lambda journal, ready: _guarded(words, journal, ready),
+        Console(quiet="--quiet" in words),
+        verbose=any(word.startswith(("-v", "--verbose")) for word in words),
+    )
+
+
+def _guarded(words: Sequence[str], journal: Journal, ready: Callable[[], None]) -> int:
+    """Run, and turn every way of ending into a status and a line."""
+    console = Console(quiet="--quiet" in words, journal=journal)
+    status, line = _outcome(words, console, ready)
+    journal.ended(status)
+    if line:
+        console.error(line)
+    return status
+
+
+def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) -> tuple[int, str]:
+    """Run, and return the status and the line to leave with."""
     try:
-        with _terminable():
-            _run(words, console)
-            sys.stdout.flush()
+        try:
+            ready()
+            try:
+                _run(words, console)
+            finally:
+                _flush_stdout()
+        finally:
+            ignore_stops()  # what is left is telling
     except SystemExit as leaving:  # after --help and --version
-        return leaving.code if isinstance(leaving.code, int) else 0
-    except GeounfoldError as error:
-        console.error(str(error))
-        return error.exit_status
-    except KeyboardInterrupt:
-        console.error("interrupted; nothing was written")
-        return _INTERRUPTED
-    except _TerminatedError:
-        console.error("terminated; nothing was written")
-        return _TERMINATED
+        return (leaving.code if isinstance(leaving.code, int) else 0), ""
+    except KeyboardInterrupt as error:
+        stop = stop_of(error)
+        return 128 + stop, f"{STOPS[stop]}; nothing was written"
     except BrokenPipeError:  # `geounfold simulate --list | head -1`
         _leave_stdout()
-        return 1
-    except MemoryError:
-        console.error("out of memory; nothing was written")
-        return 1
-    except Exception:
+        return 1, ""
+    except Exception as error:
+        if _lacks_memory(error):
+            return 1, "out of memory; nothing was written"
+        if isinstance(error, GeounfoldError):
+            return error.exit_status, str(error)
+        if isinstance(error, _StdoutError):
+            _leave_stdout()
+            return 1, f"cannot write to stdout: {error}"
         traceback.print_exc()
-        return 1
-    return 0
+        return 1, ""
+    return 0, ""
+
+
+class _StdoutError(Exception):
+    """What is printed cannot be written where stdout leads."""
+
+
+def _flush_stdout() -> None:
+    """Bring out what was printed, or raise while that can still be told."""
+    if sys.stdout is None:
+        return
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise _StdoutError(error.strerror or str(error)) from error
+
+
+def _lacks_memory(error: BaseException) -> bool:
+    """Return whether an error, or what caused it, is want of memory in one of its guises."""
+    seen: set[int] = set()
+    link: BaseException | None = error
+    while link is not None and id(link) not in seen:
+        seen.add(id(link))
+        if isinstance(link, MemoryError) or getattr(link, "errno", None) == errno.ENOMEM:
+            return True
+        if isinstance(link, SystemError) and memory_is_limited():  # a library lost the reason
+            return True
+        foreign = not isinstance(link, GeounfoldError)  # ours may quote a file
+        if foreign and _NO_MEMORY.search(str(link)):
+            return True
+        link = link.__cause__ or link.__context__
+    return False
 
 
 def _run(words: Sequence[str], console: Console) -> None:
@@ -115,23 +175,6 @@ def _logging(verbosity: int) -> Iterator[None]:
             logger.removeHandler(handler)
             logger.setLevel(old_level)
             logger.propagate = propagate
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let SIGTERM unwind the stack, so that parts of outputs are removed."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        raise _TerminatedError
-
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _leave_stdout() -> None:

@@ -9,17 +9,36 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 from geounfold.errors import OutputError
 from geounfold.io._text import shown
 from geounfold.io.tables import ending
 
-_PREFIX, _SUFFIX = ".geounfold-", ".part"
+
+class Watcher(Protocol):
+    """Hears how far the writing is."""
+
+    def part(self, path: Path) -> None:
+        """Hear that something is made at `path` that must not stay there."""
+
+    def committing(self) -> AbstractContextManager[None]:
+        """Return what surrounds the moment when outputs are moved in place."""
+
+
+class _Deaf:
+    """Does not listen."""
+
+    def part(self, path: Path) -> None: ...
+
+    def committing(self) -> AbstractContextManager[None]:
+        return nullcontext()
 
 
 @dataclass(frozen=True)
@@ -32,10 +51,13 @@ class Outputs:
         Absolute targets by the name of the option that asked for each.
     overwrite : bool
         Whether existing files may be replaced.
+    watcher : Watcher
+        Who hears of the parts of outputs and of the moment when they are moved in place.
     """
 
     paths: Mapping[str, Path]
     overwrite: bool = False
+    watcher: Watcher = field(default_factory=_Deaf)
 
     @classmethod
     def planned(
@@ -44,6 +66,7 @@ class Outputs:
         inputs: Iterable[str | Path] = (),
         *,
         overwrite: bool = False,
+        watcher: Watcher | None = None,
     ) -> Outputs:
         """Return the outputs of a run after checking all of them; nothing is left on disk.
 
@@ -56,6 +79,8 @@ class Outputs:
             The run's inputs, none of which may be an output.
         overwrite : bool, optional
             Whether existing files may be replaced.
+        watcher : Watcher, optional
+            Who is to hear of the writing.
 
         Raises
         ------
@@ -77,9 +102,10 @@ class Outputs:
             if any(_same(target, source) for source in sources):
                 raise OutputError(f"{target}: {name} is also an input; choose another file")
             _check_replaceable(target, overwrite)
-        for folder in {target.parent for target in targets.values()}:
-            _check_writable(folder)
-        return cls(targets, overwrite)
+        watcher = watcher or _Deaf()
+        for folder in sorted({target.parent for target in targets.values()}):
+            _check_writable(folder, watcher)
+        return cls(targets, overwrite, watcher)
 
     @contextmanager
     def writing(self) -> Iterator[dict[str, Path]]:
@@ -90,18 +116,22 @@ class Outputs:
         Raises
         ------
         OutputError
-            The disk is full, or a target has appeared meanwhile and may not be replaced.
+            The disk is full, a folder has gone, or a target has appeared meanwhile and may not
+            be replaced.
         """
         folders: dict[Path, Path] = {}
         try:
             with _as_output_error(self.paths.values()):
                 for folder in sorted({target.parent for target in self.paths.values()}):
-                    folders[folder] = Path(tempfile.mkdtemp(_SUFFIX, _PREFIX, folder))
+                    folders[folder] = _part_of(folder)
+                    self.watcher.part(folders[folder])
+                    folders[folder].mkdir(0o700)
                 parts = {n: folders[t.parent] / t.name for n, t in self.paths.items()}
                 yield dict(parts)
                 for part in parts.values():
                     _flush(part)
-                self._publish(parts)
+                with self.watcher.committing():
+                    self._publish(parts)
                 for folder in folders:
                     _flush(folder)
         finally:
@@ -109,20 +139,25 @@ class Outputs:
                 shutil.rmtree(part_folder, ignore_errors=True)
 
     def _publish(self, parts: Mapping[str, Path]) -> None:
-        """Move all complete files in place; take back the new ones when one cannot be."""
-        new: list[Path] = []
+        """Move all complete files in place; put everything back when one cannot be."""
+        undo: list[Callable[[], object]] = []
         try:
             for name, part in parts.items():
                 target = self.paths[name]
-                if self.overwrite and target.exists():
+                if self.overwrite and os.path.lexists(target):
+                    _check_replaceable(target, self.overwrite)
+                    old = part.with_name(f"{part.name}.old")
+                    _keep(target, old)
                     shutil.copymode(target, part)
                     os.replace(part, target)  # noqa: PTH105
+                    undo.append(partial(os.replace, old, target))
                 else:
                     _move_new(part, target)
-                    new.append(target)
+                    undo.append(target.unlink)
         except BaseException:
-            for target in new:
-                target.unlink(missing_ok=True)
+            for step in reversed(undo):
+                with suppress(OSError):
+                    step()
             raise
 
 
@@ -172,18 +207,28 @@ def _check_replaceable(target: Path, overwrite: bool) -> None:
         raise OutputError(f"{target}: the file exists already; --overwrite replaces it")
 
 
-def _check_writable(folder: Path) -> None:
+def _part_of(folder: Path) -> Path:
+    """Return a name in a folder for what is not yet an output."""
+    return folder / f".geounfold-{uuid.uuid4().hex}.part"
+
+
+def _check_writable(folder: Path, watcher: Watcher) -> None:
     """Raise where no file can be made in a folder, by making one."""
     if not folder.exists():
         raise OutputError(f"{folder}: no such folder; make it first")
     if not folder.is_dir():
         raise OutputError(f"{folder}: is a file, not a folder")
+    trial = _part_of(folder)
+    watcher.part(trial)
     try:
-        Path(tempfile.mkdtemp(_SUFFIX, _PREFIX, folder)).rmdir()
+        trial.mkdir(0o700)
     except OSError as error:
         raise OutputError(
             f"{folder}: the folder cannot be written: {error.strerror or error}"
         ) from error
+    finally:
+        with suppress(OSError):
+            trial.rmdir()
 
 
 @contextmanager
@@ -192,6 +237,8 @@ def _as_output_error(targets: Iterable[Path]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            raise MemoryError from error
         names = ", ".join(str(target) for target in targets)
         raise OutputError(
             f"cannot write {names}: {error.strerror or error}; nothing was changed"
@@ -208,6 +255,14 @@ def _flush(path: Path) -> None:
             raise
     finally:
         os.close(handle)
+
+
+def _keep(target: Path, old: Path) -> None:
+    """Keep a file under a second name until its successor is in place."""
+    try:
+        os.link(target, old)
+    except OSError:  # a file system without hard links
+        shutil.copy2(target, old)
 
 
 def _move_new(part: Path, target: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
@@ -199,7 +198,7 @@ def quality(args: Namespace, console: Console) -> None:
         if "--output" in parts:
             write_json(parts["--output"], figures)
     console.done("measured")
-    _print_figures(figures)
+    console.say("".join(_figure_lines(figures)))
 
 
 def simulate(args: Namespace, console: Console) -> None:
@@ -210,8 +209,8 @@ def simulate(args: Namespace, console: Console) -> None:
         if args.case is not None or args.output is not None:
             raise OptionError("--list stands alone: it neither takes a CASE nor writes a file")
         width = max(map(len, synthetic.CASES))
-        for name, spec in synthetic.CASES.items():
-            sys.stdout.write(f"{name:<{width}}  {spec.description}\n")
+        lines = [f"{name:<{width}}  {s.description}\n" for name, s in synthetic.CASES.items()]
+        console.say("".join(lines))
         return
     if args.case is None or args.output is None:
         raise OptionError("simulate needs CASE and -o OUT, or --list")
@@ -387,19 +386,19 @@ def _count(text: str | None, option: str) -> int | None:
     return int(text)
 
 
-def _print_figures(figures: dict[str, Any]) -> None:
-    """Print figures as aligned lines, groups of statistics as a table below the others."""
+def _figure_lines(figures: dict[str, Any]) -> list[str]:
+    """Return figures as aligned lines, groups of statistics as a table below the others."""
     width = max(map(len, figures))
     groups = {name: value for name, value in figures.items() if isinstance(value, dict)}
-    for name, value in figures.items():
-        if name not in groups:
-            sys.stdout.write(f"{name:<{width}}  {_figure(value)}\n")
+    plain = {name: value for name, value in figures.items() if name not in groups}
+    lines = [f"{name:<{width}}  {_figure(value)}\n" for name, value in plain.items()]
     for number, (name, group) in enumerate(groups.items()):
         if number == 0:
             head = "".join(f"{key:>13}" for key in group)
-            sys.stdout.write(f"\n{'':<{width}}{head}\n")
+            lines.append(f"\n{'':<{width}}{head}\n")
         cells = "".join(f"{_figure(value):>13}" for value in group.values())
-        sys.stdout.write(f"{name:<{width}}{cells}\n")
+        lines.append(f"{name:<{width}}{cells}\n")
+    return lines
 
 
 def _figure(value: Any) -> str:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import TextIO
 
 from geounfold.cli.journal import Journal
+from geounfold.errors import OutputError
 
 
 class Console:
@@ -63,6 +64,24 @@ class Console:
         """Say in one line why nothing came of it."""
         self._clear()
         self._write(f"geounfold: error: {_one_line(text)}\n")
+
+    def say(self, text: str) -> None:
+        """Print an answer on stdout.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written where stdout leads; a reader that has left is BrokenPipeError.
+        """
+        if sys.stdout is None:
+            return
+        try:
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise OutputError(f"cannot write to stdout: {error.strerror or error}") from error
 
     def _clear(self) -> None:
         if self._live:

@@ -66,10 +66,7 @@ def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) 
     try:
         try:
             ready()
-            try:
-                _run(words, console)
-            finally:
-                _flush_stdout()
+            _run(words, console)
         finally:
             ignore_stops()  # what is left is telling
     except SystemExit as leaving:  # after --help and --version
@@ -84,29 +81,11 @@ def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) 
         if _lacks_memory(error):
             return 1, "out of memory; nothing was written"
         if isinstance(error, GeounfoldError):
+            _leave_full_stdout()
             return error.exit_status, str(error)
-        if isinstance(error, _StdoutError):
-            _leave_stdout()
-            return 1, f"cannot write to stdout: {error}"
         traceback.print_exc()
         return 1, ""
     return 0, ""
-
-
-class _StdoutError(Exception):
-    """What is printed cannot be written where stdout leads."""
-
-
-def _flush_stdout() -> None:
-    """Bring out what was printed, or raise while that can still be told."""
-    if sys.stdout is None:
-        return
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise _StdoutError(error.strerror or str(error)) from error
 
 
 def _lacks_memory(error: BaseException) -> bool:
@@ -175,6 +154,15 @@ def _logging(verbosity: int) -> Iterator[None]:
             logger.removeHandler(handler)
             logger.setLevel(old_level)
             logger.propagate = propagate
+
+
+def _leave_full_stdout() -> None:
+    """Leave a stdout that does not take what it holds."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        _leave_stdout()
 
 
 def _leave_stdout() -> None:

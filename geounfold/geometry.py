@@ -140,8 +140,14 @@ def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
     F = T[:, corners].reshape(-1, 3)
     low, high = F.min(axis=1), F.max(axis=1)
     middle = F.sum(axis=1) - low - high
-    order = np.lexsort((high, middle, low))
-    keys = np.stack([low, middle, high], axis=1)[order]
+    n = int(T.max(initial=0)) + 1
+    if n**3 < 2**63:
+        keys = (low * n + middle) * n + high
+        order = np.argsort(keys, kind="stable")
+        keys = keys[order, None]
+    else:
+        order = np.lexsort((high, middle, low))
+        keys = np.stack([low, middle, high], axis=1)[order]
     fresh = np.ones(len(F), dtype=bool)
     fresh[1:] = (keys[1:] != keys[:-1]).any(axis=1)
     group = np.cumsum(fresh) - 1

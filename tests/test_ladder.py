@@ -1,0 +1,154 @@
+"""The rungs that mend a control mesh: untangling, bounded slopes, tents, pinched footprints."""
+
+import numpy as np
+import pytest
+from scipy.optimize import check_grad
+
+import geounfold as gu
+from geounfold.certificate import Gluing, examine
+from geounfold.geometry import tet_volumes
+from geounfold.mesh import TriMesh
+from geounfold.prisms import prism_tets
+from geounfold.sheet import build
+from geounfold.sheet.build import ControlOptions
+from geounfold.sheet.footprint import footprint
+from geounfold.sheet.ladder import climb
+from geounfold.sheet.layers import FRACTIONS, bounded_slope
+from geounfold.sheet.tents import with_tents
+from geounfold.untangle import _Problem, _rest_shapes, untangle
+
+RNG = np.random.default_rng(11)
+
+
+def grid(n, layers):
+    i, j = (a.ravel().astype(float) for a in np.indices((n, n)))
+    k = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    V = np.concatenate([np.column_stack([i, j, np.full(n * n, float(z))]) for z in range(layers)])
+    return V, prism_tets(F, n * n, layers), F
+
+
+def test_untangling_moves_few_vertices_and_turns_all_upright():
+    V, T, _ = grid(12, 4)
+    spoiled = V.copy()
+    bad = np.array([144 + 12 * 5 + 5, 144 + 12 * 5 + 6])
+    spoiled[bad] += [0.0, 0.3, 1.7]  # pushed through the layer above, which is 1 away
+    inverted = tet_volumes(spoiled, T) <= 0
+    assert inverted.any()
+    mended = untangle(spoiled, T, V, np.unique(T[inverted]))
+    assert (tet_volumes(mended, T) > 0).all()
+    assert examine(mended, Gluing.of(T)).none
+    moved = (mended != spoiled).any(axis=1)
+    # One ring around the elements at fault, of 576 vertices.
+    assert moved.sum() < 150
+    assert np.abs(mended - V).max() < 0.5
+
+
+def test_the_foldover_energy_has_the_gradient_it_says():
+    V, T, _ = grid(3, 3)
+    spoiled = V + 0.4 * RNG.normal(size=V.shape)  # some inverted, some not
+    volumes = tet_volumes(spoiled, T)
+    assert (volumes < 0).any()
+    assert (volumes > 0).any()
+    problem = _Problem(spoiled, T, _rest_shapes(V, T), np.arange(len(V)))
+    x = spoiled.ravel()
+    error = check_grad(
+        lambda y: problem._energy(y, 0.3)[0], lambda y: problem._energy(y, 0.3)[1], x
+    )
+    # Finite differences of step 1.5e-8 in an energy of some thousands.
+    assert error < 1e-5 * np.linalg.norm(problem._energy(x, 0.3)[1])
+
+
+def test_slopes_are_bounded_and_never_raised():
+    V, _, F = grid(15, 2)
+    U = V[: 15 * 15, :2]
+    values = RNG.uniform(1, 9, len(U))
+    out = bounded_slope(values, U, F, 0.5)
+    assert (out <= values).all()
+    edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    rise = np.abs(out[edges[:, 0]] - out[edges[:, 1]])
+    length = np.linalg.norm(U[edges[:, 0]] - U[edges[:, 1]], axis=1)
+    assert (rise <= 0.5 * length + 1e-12).all()
+    # The largest such field: a lone low node makes a cone.
+    lone = np.full(len(U), 9.0)
+    lone[112] = 1.0  # the middle node
+    cone = bounded_slope(lone, U, F, 0.5)
+    along = U[:, 1] == U[112, 1]
+    assert cone[along] == pytest.approx(1 + 0.5 * np.abs(U[along, 0] - U[112, 0]))
+
+
+def test_cells_that_touch_in_a_corner_are_joined():
+    """Two clouds of feet whose cells, without dilation, meet in one corner."""
+    first = RNG.uniform(0, 6, (400, 2))
+    prints = footprint(np.concatenate([first, first - 6.0]), 0.0, 1.0, 0)
+    T = prism_tets(prints.F, len(prints.U), 2)
+    assert Gluing.of(T).sound
+    ringed = footprint(np.concatenate([first, first - 6.0]), 0.0, 1.0, 0, rings=2)
+    assert np.array_equal(ringed.F, prints.F)
+    assert np.allclose(ringed.U, prints.U)
+    assert len(ringed.ring.F)
+    whole = np.concatenate([ringed.F, ringed.ring.F])
+    nodes = np.concatenate([ringed.U, ringed.ring.U])
+    assert Gluing.of(prism_tets(whole, len(nodes), 2)).sound
+    # The ring is past the footprint, two cells wide.
+    assert nodes.max(axis=0) == pytest.approx(prints.U.max(axis=0) + 2)
+
+
+@pytest.fixture(scope="module")
+def plunging():
+    body = gu.simulate("plunging", width=200.0)
+    return gu.unfold(body.folded, reach=0.0)
+
+
+def columns_of(u):
+    fit, options = u.fits[0].sheet, ControlOptions(shell=0.0)
+    points = np.ascontiguousarray(u.frame.to_work(u.folded))
+    foot = build.block_feet(fit.fitted, points, reach=10.0)
+
+    def flat(mesh: TriMesh, start):
+        return gu.flatten(mesh, "spring", start=start)
+
+    return build._columns(fit.fitted, fit.horizons, foot, None, flat, options, "mid"), points
+
+
+def test_tents_hold_blocks_just_outside_and_stay_proved(plunging):
+    columns, _ = columns_of(plunging)
+    offsets = np.full((2, columns.count), 4.2)  # half the thickness is 5
+    laid = columns.lay_out(columns.surround(columns.layers(offsets, FRACTIONS)))
+    top = laid.folded[laid.node == laid.node[columns.count // 2]]  # one column, from the bottom up
+    outward = (top[-1] - top[-2]) / np.linalg.norm(top[-1] - top[-2])
+    lost = top[-1] + np.outer([0.2, 0.5], outward) + [[0.1, 0.2, 0.0], [-0.3, 0.1, 0.0]]
+    more, left = with_tents(laid, lost)
+    assert not len(left)
+    assert len(more.shell)
+    gluing = Gluing.of(more.all_tets)
+    assert gluing.sound
+    assert examine(more.folded, gluing).none
+    assert examine(more.unfolded, gluing).none
+    assert np.array_equal(more.folded[: laid.inner], laid.folded)
+
+
+def test_the_ladder_records_what_every_rung_gave(plunging):
+    columns, points = columns_of(plunging)
+
+    def rung(offset):
+        return columns, columns.layers(np.full((2, columns.count), offset), FRACTIONS)
+
+    # 40 blocks are past the focal distance of the hinges (12 blocks): turned inside out.
+    climbed = climb([("far", lambda: rung(40.0)), ("near", lambda: rung(5.6))], points, 3)
+    assert climbed.proved
+    names = [r.name for r in climbed.rungs]
+    assert names[0] == "far"
+    assert names[-1] == "near"
+    assert climbed.rungs[0].inverted_folded > 0
+    assert climbed.rungs[-1].flaws == climbed.rungs[-1].lost == 0
+
+
+def test_what_cannot_be_proved_is_given_back_unproved(plunging):
+    columns, points = columns_of(plunging)
+    offsets = np.full((2, columns.count), 40.0)
+    climbed = climb([("far", lambda: (columns, columns.layers(offsets, FRACTIONS)))], points, 1)
+    assert not climbed.proved
+    assert climbed.rungs[-1].name == "shrunk"
+    assert climbed.rungs[-1].flaws > 0

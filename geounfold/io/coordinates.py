@@ -50,7 +50,7 @@ _MIXED: tuple[Triple, ...] = tuple(
 )
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
-_DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. ']?\d{3})*,\d+|[+-]?\d+,\d+")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+|[+-]?\d+,\d+")
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
 
 
@@ -111,11 +111,15 @@ def coordinate_columns(
         found = [family for family in tier if set(family) <= set(plain)]
         if found:
             return _only(found, names, plain, source)
-    hint = "the first row must name the columns" if _all_numbers(names) else "name them by"
-    tail = "" if _all_numbers(names) else " --columns a,b,c"
+    if _all_numbers(names):
+        hint = "the first row must name the columns"
+    elif len(names) == 1:
+        hint = "columns are separated by commas, semicolons or tabs"
+    else:
+        hint = "name them by --columns a,b,c"
     raise InputError(
         f"{source}: no coordinate columns (such as x, y, z or centroid_x, centroid_y, "
-        f"centroid_z) found; the file has: {listing(names)}; {hint}{tail}"
+        f"centroid_z) found; the file has: {listing(names)}; {hint}"
     )
 
 
@@ -203,6 +207,6 @@ def _hint(word: str) -> str:
     """Return what to do about a number in another country's notation."""
     if "," in word and _DECIMAL_COMMA.fullmatch(word):
         return "; write decimals with a point, not a comma"
-    if re.fullmatch(r"[+-]?\d{1,3}(?:[, ']\d{3})+(?:\.\d+)?", word):
+    if re.fullmatch(r"[+-]?\d{1,3}(?:[, '\u00a0\u2009\u202f]\d{3})+(?:\.\d+)?", word):
         return "; write numbers without thousands separators"
     return ""

@@ -6,14 +6,17 @@ the columns that are asked for become numbers. Parquet columns keep their types.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import io
 import json
+import re
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +30,11 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 TABLE_ENDINGS = (".csv", ".csv.gz", ".parquet")
-_HEAD = 1 << 16
+_LINE_END = re.compile(rb"\r\n|\n|\r")
+_MOST_COLUMNS = 1 << 16  # what a line without end is cut into
+_CHUNK = 1 << 20
+_ROOM = 1 << 28  # bytes that any compressed table may unpack to
+_RATIO = 100  # ... and how often its own size where it is larger; tables of points: 3 to 10
 _FOREIGN = {
     b"PAR1": "a Parquet file: name it .parquet",
     b"\x1f\x8b": "compressed by gzip: name it .csv.gz",
@@ -72,13 +79,15 @@ def existing_file(path: Path) -> Path:
     Raises
     ------
     InputError
-        No such file, a directory, not readable, or empty.
+        No such file, a directory, a pipe or device, not readable, or empty.
     """
     try:
         if path.is_dir():
             raise InputError(f"{path}: is a directory, not a file")
         if not path.exists():
             raise InputError(f"{path}: no such file")
+        if not path.is_file():
+            raise InputError(f"{path}: is a pipe or a device; save what it holds to a file first")
         with path.open("rb") as stream:
             if not stream.read(1):
                 raise InputError(f"{path}: the file is empty")
@@ -124,6 +133,8 @@ def _as_input_error(path: Path) -> Iterator[None]:
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"{path}: the compressed file is damaged: {error}") from error
     except (csv.Error, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
+        if "out of memory" in str(error):
+            raise MemoryError from error
         words = str(error).removeprefix("Error tokenizing data. C error: ").strip()
         raise InputError(f"{path}: is not a well-formed table: {words}") from error
     except OSError as error:
@@ -133,14 +144,15 @@ def _as_input_error(path: Path) -> Iterator[None]:
 def _read_csv(path: Path) -> Table:
     """Return a CSV's columns as text."""
     with _as_input_error(path):
-        names, separator, skip = _csv_header(path)
+        content = _content(path)
+        names, separator, skip = _csv_header(path, content)
         try:
             frame = pd.read_csv(
-                path,
+                io.BytesIO(content),
                 sep=separator,
                 header=None,
-                names=range(len(names)),
                 skiprows=skip,
+                names=range(len(names)),
                 dtype=str,
                 na_filter=False,
                 encoding="utf-8-sig",
@@ -158,20 +170,33 @@ def _read_csv(path: Path) -> Table:
     return Table(frame, text=True)
 
 
-def _csv_header(path: Path) -> tuple[list[str], str, int]:
-    """Return a CSV's column names, its separator, and the lines down to the header's end."""
-    opened = gzip.open if ending(path) == ".csv.gz" else open
-    with opened(path, "rb") as stream:
-        head = stream.read(_HEAD)
+def _content(path: Path) -> bytes:
+    """Return what a CSV holds, unpacked; not without end."""
+    if ending(path) != ".csv.gz":
+        return path.read_bytes()
+    chunks, total = [], 0
+    most = max(_ROOM, _RATIO * path.stat().st_size)
+    with gzip.open(path, "rb") as stream:
+        while chunk := stream.read(_CHUNK):
+            chunks.append(chunk)
+            total += len(chunk)
+            if total > most:
+                raise InputError(
+                    f"{path}: is not a table: the file would unpack to more than {most >> 20} MiB; "
+                    "if it is one, unpack it first"
+                )
+    return b"".join(chunks)
+
+
+def _csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
+    """Return a CSV's column names, its separator, and how many rows come before the first."""
     for magic, what in _FOREIGN.items():
-        if head.startswith(magic):
+        if content.startswith(magic):
             raise InputError(f"{path}: is not a CSV table but {what}")
-    if b"\0" in head:
+    if b"\0" in content:  # at which the parser would cut a value short
         raise InputError(f"{path}: is not a table: it holds binary data")
-    end = max(head.rfind(b"\n"), head.rfind(b"\r"))  # no half character at the end
-    text = (head[: end + 1] if len(head) == _HEAD and end >= 0 else head).decode("utf-8-sig")
-    lines = io.StringIO(text, newline=None)
     blank = 0
+    lines = _lines(content)
     for line in lines:
         if line.strip():
             break
@@ -180,7 +205,22 @@ def _csv_header(path: Path) -> tuple[list[str], str, int]:
         raise InputError(f"{path}: the file is empty")
     bare = "".join(line.split('"')[::2])  # what stands outside quotes
     separator = max(",;\t", key=bare.count)
-    return [n.strip() for n in next(csv.reader([line], delimiter=separator))], separator, blank + 1
+    names = next(csv.reader(chain([line], lines), delimiter=separator))
+    if len(names) > _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: is not a table of points: its first row names {len(names)} columns"
+        )
+    return [n.strip() for n in names], separator, blank + 1
+
+
+def _lines(content: bytes) -> Iterator[str]:
+    """Yield lines with their ends, whichever these are, without a byte-order mark."""
+    start = len(codecs.BOM_UTF8) if content.startswith(codecs.BOM_UTF8) else 0
+    while start < len(content):
+        found = _LINE_END.search(content, start)
+        end = found.end() if found else len(content)
+        yield content[start:end].decode("utf-8")
+        start = end
 
 
 def _pyarrow() -> ModuleType:
@@ -198,6 +238,8 @@ def _read_parquet(path: Path) -> Table:
     try:
         arrow = pyarrow.parquet.ParquetFile(path).read()
         frame = arrow.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
+    except MemoryError:
+        raise
     except (pyarrow.ArrowException, OSError) as error:
         words = shown(" ".join(str(error).split()))
         raise InputError(f"{path}: is not a Parquet table, or is damaged: {words}") from error

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from geounfold.errors import InputError, OptionError
 from geounfold.frame import Frame
 from geounfold.lattice import Lattice, distinct, lattice_indices, measure_lattice, point_spacing
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.mesh import Floats, Ints
 
 MIN_POINTS = 50
 """Fewest distinct points of a body: a sheet of 5 x 5 blocks, two thick."""
@@ -23,11 +23,9 @@ SPECK_SHARE = 0.005
 """A body with a smaller share of the points is a speck."""
 
 _FLAT = 0.05  # extent, in point spacings, below which points lie on a line or plane
-_ONE_LAYER = 1.25  # blocks; measured: one layer 0.7 to 1.1, two layers from 1.4 (dip of 45)
-_FULL_SHARE = 0.25  # of the blocks in a full 2 x 2 x 2 cube: one layer < 0.1, two 1.0
 _SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
-_RADIUS = 3  # blocks, for the thickness around a block
-_SAMPLE = 2000  # blocks whose thickness is measured
+_MARGIN = 2  # blocks, the farthest neighbours that are looked up
+_SAMPLE = 2000  # blocks that are looked at
 _NEAR, _WIDE = 21, 64  # neighbours that join scattered points, and those tried for the rest
 _REACH, _CAP = 1.15, 2.0  # of the near neighbours' distance; of its median
 
@@ -76,8 +74,9 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
     Raises
     ------
     InputError
-        Too few distinct points; all in one column, on a line or in a plane; or a sheet, flat
-        or folded, of one layer of blocks.
+        Too few distinct points; all in one column, on a line or in a plane; or all on one
+        surface and not on a lattice.  A folded sheet of one layer of blocks has a top and a
+        bottom, as its blocks have.
     """
     X = distinct(points)
     _check_count(X, len(points))
@@ -85,14 +84,11 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
     if lattice is None:
         lattice = measure_lattice(X)
     cells = None if lattice is None else _Cells.of(lattice_indices(X, lattice))
-    if cells is None or cells.gappy():
-        thin = _one_layer_of_points(X)
-    else:
-        thin = _one_layer_of_blocks(cells)
-    if thin:
+    if (cells is None or cells.gappy()) and _one_layer_of_points(X):
         raise InputError(
-            f"the {len(X)} points form a sheet one block thick, whose top and bottom are the "
-            "same; give at least two layers of blocks (smaller blocks across the sheet)"
+            f"the {len(X)} points lie on one surface, on no lattice of touching blocks: a sheet "
+            "one block thick, and nothing tells how thick a block is; give at least two layers "
+            "of blocks (smaller blocks across the sheet)"
         )
 
 
@@ -230,8 +226,8 @@ def _check_extent(X: Floats) -> None:
         )
     if across < limit:
         raise InputError(
-            f"all {len(X)} points are in one plane, so the body has no thickness; "
-            "give at least two layers of blocks"
+            f"all {len(X)} points are in one plane, so nothing tells how thick the body is (and "
+            "it is unfolded already); give at least two layers of blocks"
         )
 
 
@@ -245,9 +241,9 @@ class _Cells:
 
     @classmethod
     def of(cls, indices: Ints) -> _Cells:
-        """Hash integer cells (n, 3); offsets of up to _RADIUS cells never collide."""
-        low = indices.min(axis=0) - _RADIUS
-        size = indices.max(axis=0) - low + 1 + _RADIUS
+        """Hash integer cells (n, 3); offsets of up to _MARGIN cells never collide."""
+        low = indices.min(axis=0) - _MARGIN
+        size = indices.max(axis=0) - low + 1 + _MARGIN
         strides = np.array([size[1] * size[2], size[2], 1], dtype=np.int64)
         keys, cell = np.unique((indices - low) @ strides, return_inverse=True)
         return cls(keys, strides, cell)
@@ -276,33 +272,6 @@ def _offsets(reach: int) -> list[tuple[int, ...]]:
     """Return the cells up to ``reach`` steps away along each axis, the cell itself left out."""
     span = range(-reach, reach + 1)
     return [offset for offset in product(span, repeat=3) if any(offset)]
-
-
-def _one_layer_of_blocks(cells: _Cells) -> bool:
-    """Say whether most blocks belong to a sheet of one layer.
-
-    The blocks within three steps of a block, over the area of a disc of that radius, are the
-    thickness of the sheet there, whatever its dip.  The upper quartile over the blocks leaves
-    rims out.  Narrow strips two blocks thick pass by their full cubes of 2 x 2 x 2 blocks.
-    """
-    some = cells.sample()
-    count = np.ones(len(some))
-    for offset in _offsets(_RADIUS):
-        if np.dot(offset, offset) <= _RADIUS**2:
-            count += cells.find(some, offset) >= 0
-    thickness = np.percentile(count, 75) / (np.pi * _RADIUS**2)
-    return bool(thickness < _ONE_LAYER and _in_full_cube(cells, some).mean() < _FULL_SHARE)
-
-
-def _in_full_cube(cells: _Cells, some: Ints) -> Bools:
-    """Return which cells belong to a cube of 2 x 2 x 2 occupied ones."""
-    filled = {offset: cells.find(some, offset) >= 0 for offset in _offsets(1)}
-    filled[0, 0, 0] = np.ones(len(some), bool)
-    out = np.zeros(len(some), bool)
-    for sides in product((0, -1), repeat=3):
-        corners = product(*[(side, side + 1) for side in sides])
-        out |= np.logical_and.reduce([filled[corner] for corner in corners])
-    return out
 
 
 def _one_layer_of_points(X: Floats) -> bool:

@@ -99,11 +99,18 @@ def test_a_plane(points, turn):
 
 @pytest.mark.parametrize("amplitude", [1, 3, 8, 16])  # steepest dips 7, 21, 45 and 64 degrees
 @pytest.mark.parametrize("turn", [np.eye(3), TURN])
-def test_a_folded_sheet_of_one_block_is_refused_and_of_two_passes(amplitude, turn):
-    with pytest.raises(InputError, match="one block thick"):
-        check_points(sheet(1, amplitude) @ turn.T + UTM)
-    check_points(sheet(2, amplitude) @ turn.T + UTM)
-    check_points(sheet(3, amplitude) @ turn.T + UTM)
+def test_a_folded_sheet_of_blocks_passes_however_thin(amplitude, turn):
+    for thickness in (1, 2, 3):  # blocks; a block on a lattice has a top and a bottom
+        check_points(sheet(thickness, amplitude) @ turn.T + UTM)
+
+
+def test_one_layer_of_blocks_without_their_lattice_is_refused():
+    # The same sheet with centroids off by a fifth of a block: nothing tells a block's size.
+    blocks = sheet(1, 3)
+    moved = blocks + np.random.default_rng(3).normal(0, 0.2, blocks.shape) * [1, 1, 0]
+    assert measure_lattice(moved) is None
+    with pytest.raises(InputError, match="nothing tells how thick a block is"):
+        check_points(moved @ TURN.T + UTM)
 
 
 @pytest.mark.parametrize("steps", [(1.0, 1.0, 1.0), (20.0, 20.0, 5.0), (25.0, 25.0, 2.5)])

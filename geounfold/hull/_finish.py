@@ -29,6 +29,8 @@ class HullOptions:
         Sweeps of isotropic remeshing.
     sigma : float
         Standard deviation of the density's blur, block sides.
+    sigma_thin : float
+        That of sheets one or two blocks thick, in the longest block side.
     level : float
         Share of the inner density on the density hull.
     shell : float
@@ -42,6 +44,7 @@ class HullOptions:
     edge: float = 1.5
     remesh_iterations: int = 2
     sigma: float = 0.8
+    sigma_thin: float = 1.0
     level: float = 0.5
     shell: float = 0.9
     smoothing: int = 10

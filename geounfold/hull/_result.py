@@ -28,12 +28,16 @@ class Hull:
         Volume of the blocks: their count, as one block is one cubic working unit.
     inset : float
         How far inside the blocks' own outer faces the surface runs, in working units:
-        0.5 where it passes through the outermost centroids, 0 where it encloses the blocks.
+        0.5 where it passes through the outermost centroids, 0 where it encloses the blocks,
+        negative where it runs outside of them.
     blur : float
         Standard deviation (working units per unit of block side) of the Gaussian blur the
         surface was made with; its curvature bias is undone later.  0 where there was none.
     dropped : int
         Faces of cavities and specks that were left out.
+    even : bool
+        True where the blur was as wide along every axis, ``blur`` in working units, though the
+        blocks' sides differ.
     reason : str
         Why this method was chosen, when the choice was automatic; else empty.
     """
@@ -45,6 +49,7 @@ class Hull:
     inset: float
     blur: float
     dropped: int = 0
+    even: bool = False
     reason: str = ""
 
     def blur_variance(self, steps: Floats | None) -> Floats:
@@ -55,6 +60,7 @@ class Hull:
         steps : (3,) float or None
             Block sides in working units, as given to the hull.
         """
-        sides = np.ones(3) if steps is None or steps.max() / steps.min() <= UNEQUAL else steps
+        alike = self.even or steps is None or steps.max() / steps.min() <= UNEQUAL
+        sides = np.ones(3) if alike or steps is None else steps
         out: Floats = self.blur**2 * sides * sides
         return out

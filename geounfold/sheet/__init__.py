@@ -13,11 +13,16 @@ from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
 from geounfold.sheet.conform import ConformOptions, conform
 from geounfold.sheet.fit import FitOptions, FittedSheet, Samples, fit_sheet
-from geounfold.sheet.horizons import HorizonOptions, Horizons, fit_horizons
+from geounfold.sheet.horizons import (
+    HorizonOptions,
+    Horizons,
+    fit_horizons,
+    separate_horizons,
+)
 from geounfold.sheet.layered import LayerOptions, sharpen_layers
 from geounfold.sheet.medial import MedialOptions, MedialSheet, medial_sheet
 from geounfold.sheet.occupancy import OccupancyOptions, sharpen
-from geounfold.sheet.sites import surface_sites
+from geounfold.sheet.sites import Sites, surface_sites
 from geounfold.split import SurfaceSplit
 
 __all__ = [
@@ -116,12 +121,17 @@ def fit_body(
     medial = medial_sheet(split, _parameters, options.medial)
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)
+    sites = None
     if exact:
         fitted, sharpened = fit_sheet(medial, samples, points, options.fit), ""
     else:
-        fitted, sharpened = _fitted(medial, samples, points, steps, options)
+        if steps is not None:
+            sites = surface_sites(np.rint(points / steps).astype(np.int64), steps)
+        fitted, sharpened = _fitted(medial, samples, points, sites, options)
     fitted = conform(fitted, medial, _parameters, options.conform)
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
+    if sites is not None and sharpened:
+        horizons = separate_horizons(fitted, horizons, sites, options.horizons, options.occupancy)
     mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh, sharpened)
 
@@ -135,7 +145,7 @@ def _fitted(
     medial: MedialSheet,
     samples: Samples,
     points: Floats,
-    steps: Floats | None,
+    sites: Sites | None,
     options: SheetOptions,
 ) -> tuple[FittedSheet, str]:
     """Return the fitted sheet, and what sharpened it (see SheetResult).
@@ -144,11 +154,10 @@ def _fitted(
     smoothly.
     """
     fitted = fit_sheet(medial, samples, points, options.fit)
-    if steps is None:
+    if sites is None:
         layered = sharpen_layers(fitted, points, options.layers)
         return (fitted, "") if layered is None else (layered, "layers")
-    cells = np.rint(points / steps).astype(np.int64)
-    sharper = sharpen(fitted, surface_sites(cells, steps), options.occupancy)
+    sharper = sharpen(fitted, sites, options.occupancy)
     if sharper is not None:
         return sharper, "sites"
     rougher = replace(options.fit, rough=options.refused_rough)

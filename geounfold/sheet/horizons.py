@@ -1,4 +1,10 @@
-"""Top and bottom as heights over the flat mid surface, for the stratigraphic coordinate."""
+"""Top and bottom as heights over the flat mid surface, for the stratigraphic coordinate.
+
+They are fitted to the hull, and then, on a lattice, moved until they separate blocks from empty
+sites, as the sheet was (see `occupancy`).  What the sites leave open, on limbs along a lattice
+plane say, the hull settles, where it can: a sheet of a few blocks is no thicker than the hull is
+blurred, and there it is the sharpened half thickness that does.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.mesh import Floats
+from geounfold.mesh import Floats, Ints
 from geounfold.sheet.fit import RIDGE, FittedSheet, Samples, unbiased_heights
+from geounfold.sheet.normal import Stencils
+from geounfold.sheet.occupancy import OccupancyOptions, Places, separating_step
+from geounfold.sheet.sites import Sites
 from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import near_any
 
@@ -19,7 +28,9 @@ class HorizonOptions:
     ``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull normal
     and the mid surface's, below which a sample is rim; ``erosion``: distance kept from the
     rim, where hulls are rounded; ``misfit``: largest departure from the half thickness;
-    ``stiffness``: pull towards the half thickness where there are no samples.
+    ``stiffness``: pull towards the half thickness where there are no samples; ``separate``:
+    smoothing length of what the sites add; ``margins``: softness of the separation, round by
+    round; ``blurred``: half thickness up to which the hull's heights are not used.
     """
 
     smooth: float = 1.5
@@ -27,6 +38,9 @@ class HorizonOptions:
     erosion: float = 0.5
     misfit: float = 2.5
     stiffness: float = 1e-4
+    separate: float = 1.5
+    margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.03)
+    blurred: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,3 +110,60 @@ def fit_horizons(
         rest = K.solver(ridge=1e-12)(B.T @ (w * (height[use] - s * expected[use])))
         found.append(rest + s * reach)
     return Horizons(grid, found[0], found[1])
+
+
+def separate_horizons(
+    fitted: FittedSheet,
+    hull: Horizons,
+    sites: Sites,
+    options: HorizonOptions,
+    occupancy: OccupancyOptions,
+) -> Horizons:
+    """Return the height fields of top and bottom that separate blocks from empty sites.
+
+    Each leaves its start as far as the sites on its own side ask for: the energy is that of
+    `sharpen`, with the second differences of what is added.
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Sharpened by the sites.
+    hull : Horizons
+        Fitted to the hull: the start, unless the sheet is thin.
+    sites : Sites
+        Lattice sites at the body's surface.
+    options : HorizonOptions
+        See there.
+    occupancy : OccupancyOptions
+        How sites are chosen.
+    """
+    grid = fitted.sheet.grid
+    nodes, _ = fitted.sheet.samples()
+    held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
+    still = (options.separate / grid.step) ** 4 * grid.energy(2) + options.stiffness * held
+    thin = float(np.median(grid.value(fitted.half, fitted.near))) <= options.blurred
+    start = (hull.top, -hull.bottom)
+    if thin:
+        start = (fitted.reach(1.0, fitted.half), fitted.reach(-1.0, fitted.half))
+    reach = start
+    places = Places.of(fitted, sites, occupancy)
+    places.follow(fitted.sheet, reach, fitted.slip, steps=1)
+    for margin in options.margins:
+        use = places.explained(margin, occupancy.depths[-1], occupancy)
+        above = places.side[use] > 0
+        rise = [
+            _rise(places, mine, grid, margin, still, now - first)
+            for mine, now, first in zip((use[above], use[~above]), reach, start, strict=True)
+        ]
+        reach = (reach[0] + rise[0], reach[1] + rise[1])
+        places.level(grid, reach)
+    return Horizons(grid, reach[0], -reach[1])
+
+
+def _rise(
+    places: Places, use: Ints, grid: SplineGrid, margin: float, still: Stencils, rest: Floats
+) -> Floats:
+    """Return a Newton step of a horizon's reach, outwards, from some of the sites."""
+    H, occupied = grid.basis(places.flat[use]), places.sites.occupied[use]
+    height = places.beyond[use]
+    return separating_step(H, height, occupied, margin, grid.step, still, still @ rest)

@@ -4,7 +4,7 @@ A blurred hull averages a staircase; where a horizon runs nearly along a lattice
 errs by a fixed part of a block.  The sites themselves are exact: a block's centroid lies inside
 the body, its empty neighbour's outside.  So top and bottom are the smoothest pair of surfaces
 that separate the two, found as in logistic classification with a margin that shrinks from 0.3
-block to 0.02.
+block to 0.02.  In a sheet of one or two blocks a block is near both surfaces, and speaks for both.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from geounfold.sheet.displace import (
 from geounfold.sheet.fit import RIDGE, FittedSheet
 from geounfold.sheet.normal import Stencils, gram
 from geounfold.sheet.sites import Sites
-from geounfold.sheet.spline import density_weights
+from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Sheet, slip_potential
 
 
@@ -38,10 +38,12 @@ class OccupancyOptions:
     ``tolerated`` of the sites lie on the wrong side and the margin is at most ``adapt``;
     ``smooth_half``: that of the half thickness; ``rim``: a site this near to an empty site
     inside the layer is the rim's, not a horizon's; ``depths``: how far below the horizon that
-    is, round by round; ``band``: largest distance of a site from its horizon; ``thinnest``,
-    ``taper``: half thickness below which, and its slope above which, sites are left alone;
-    ``slack``: how far sites past those limits are followed all the same, as the sheet moves;
-    ``misfit``: mean depth on the wrong side above which the first fit is kept.
+    is, round by round; ``thin``, ``cover``: where the half thickness is at most ``thin``, that
+    is anywhere below the horizon but farther than ``cover`` along the sheet from any block;
+    ``band``: largest distance of a site from its horizon; ``thinnest``, ``taper``: half
+    thickness below which, and its slope above which, sites are left alone; ``slack``: how far
+    sites past those limits are followed all the same, as the sheet moves; ``misfit``: mean
+    depth on the wrong side above which the first fit is kept.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -54,7 +56,9 @@ class OccupancyOptions:
     rim: float = 1.0
     depths: tuple[float, ...] = (1.25, 1.0, 0.75)
     band: float = 1.2
-    thinnest: float = 1.0
+    thin: float = 1.25
+    cover: float = 0.9
+    thinnest: float = 0.25
     taper: float = 0.25
     slack: float = 0.5
     misfit: float = 0.01
@@ -99,16 +103,15 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     options : OccupancyOptions
         See there.
     """
+    fitted = _held_open(fitted, options)
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
-    foot = sheet.search(fitted.near, reach=8.0).feet(sites.points)
-    seen = foot.miss < 0.02
-    places = _Places.at(Sites(sites.points[seen], sites.occupied[seen]), foot.U[seen])
+    places = Places.of(fitted, sites, options)
     rough, fine = grid.energy(4), grid.energy(3)
     smooth, last = options.smooth, None
     used = fitted.near
     for k, margin in enumerate(options.margins):
         depth = options.depths[min(k, len(options.depths) - 1)]
-        places.follow(sheet, half, fitted.slip, steps=1 if k else 0)
+        places.follow(sheet, (half, half), fitted.slip, steps=1 if k else 0)
         use = places.explained(margin, depth, options)
         if not len(use):
             return None
@@ -126,41 +129,72 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
 
 
-def _clearance(margin: float) -> float:
+def _held_open(fitted: FittedSheet, options: OccupancyOptions) -> FittedSheet:
+    """Return a thin sheet with a half thickness of at least half its median.
+
+    The hull of a thin sheet ends in a wide rim, over which the half thickness was continued;
+    where it came to nothing no site would be listened to.
+    """
+    median = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near)))
+    if median > options.thin:
+        return fitted
+    return replace(fitted, half=np.maximum(fitted.half, median / 2))
+
+
+def clearance(margin: float) -> float:
     """Return how far on its own side of a horizon a site still says something."""
     return max(0.15, 6 * margin)
 
 
 @dataclass(eq=False)
-class _Places:
+class Places:
     """Where the sites lie in the sheet's coordinates; those watched are followed as it moves.
 
-    ``U`` (n, 2) feet, ``t`` (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded
-    parameters; ``half`` (n,) half thickness and ``taper`` (n,) its slope there; ``watched``
-    (w,) rows.
+    ``farther`` (n,): seen from the farther horizon, not the nearer; ``U`` (n, 2) feet, ``t``
+    (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded parameters; ``half`` (n,) half
+    thickness, ``taper`` (n,) its slope and ``middle`` (n,) offset half-way between the horizons
+    there; ``watched`` (w,) rows.
     """
 
     sites: Sites
+    farther: Bools
     U: Floats
     t: Floats
     normal: Floats
     flat: Floats
     half: Floats
     taper: Floats
+    middle: Floats
     watched: Ints
 
     @classmethod
-    def at(cls, sites: Sites, U: Floats) -> _Places:
-        """Return sites at feet U (n, 2), the rest to be found by `follow`."""
-        n = len(U)
-        blank = (np.empty(n) for _ in range(3))
-        t, half, taper = blank
-        return cls(sites, U, t, np.empty((n, 3)), np.empty((n, 2)), half, taper, np.arange(n))
+    def of(cls, fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Places:
+        """Return the sites with a foot on a sheet, the rest to be found by `follow`.
+
+        Blocks near both horizons are there twice.
+        """
+        sheet = fitted.sheet
+        foot = sheet.search(fitted.near, reach=8.0).feet(sites.points)
+        seen = foot.miss < 0.02
+        across = np.abs(foot.t) + sheet.grid.value(fitted.half, foot.U)
+        twice = across < clearance(options.margins[0]) + options.slack
+        rows = np.concatenate([np.flatnonzero(seen), np.flatnonzero(seen & twice & sites.occupied)])
+        n = len(rows)
+        farther = np.arange(n) >= int(seen.sum())
+        t, half, taper, middle = (np.empty(n) for _ in range(4))
+        normal, flat, U = np.empty((n, 3)), np.empty((n, 2)), foot.U[rows]
+        chosen = Sites(sites.points[rows], sites.occupied[rows])
+        return cls(chosen, farther, U, t, normal, flat, half, taper, middle, np.arange(n))
+
+    @property
+    def side(self) -> Floats:
+        """The horizon each is seen from: +1 the top, -1 the bottom, (n,)."""
+        return np.where((self.t < self.middle) == self.farther, 1.0, -1.0)
 
     @property
     def beyond(self) -> Floats:
-        """Height over the horizon on the site's side of the mid surface, (n,)."""
-        return np.abs(self.t) - self.half  # distance from the mid surface, on whichever side
+        """Height over the horizon, (n,): away from the middle of the layer is up."""
+        return self.side * (self.t - self.middle) - self.half
 
     @property
     def right(self) -> Floats:
@@ -168,18 +202,27 @@ class _Places:
         beyond = self.beyond
         return np.where(self.sites.occupied, -beyond, beyond)
 
-    def follow(self, sheet: Sheet, half: Floats, slip: Floats, steps: int) -> None:
-        """Find the watched sites' places anew."""
+    def follow(self, sheet: Sheet, reach: tuple[Floats, Floats], slip: Floats, steps: int) -> None:
+        """Find the watched sites' places anew; ``reach``: coefficients up to top and bottom."""
         rows, grid = self.watched, sheet.grid
         foot = follow_feet(sheet, self.sites.points[rows], self.U[rows], steps)
         flat = foot.U - foot.t[:, None] * grid.value(slip, foot.U)
-        thickness, hu, hv = grid.gradient(half, flat)
         self.U[rows], self.t[rows], self.normal[rows] = foot.U, foot.t, foot.normal
-        self.flat[rows], self.half[rows], self.taper[rows] = flat, thickness, np.hypot(hu, hv)
+        self.flat[rows] = flat
+        self.level(sheet.grid, reach)
+
+    def level(self, grid: SplineGrid, reach: tuple[Floats, Floats]) -> None:
+        """Find the horizons' heights at the watched sites' places anew."""
+        rows, (top, bottom) = self.watched, reach
+        half, hu, hv = grid.gradient((top + bottom) / 2, self.flat[rows])
+        self.half[rows], self.taper[rows] = half, np.hypot(hu, hv)
+        self.middle[rows] = (
+            0.0 if top is bottom else grid.value((top - bottom) / 2, self.flat[rows])
+        )
 
     def watch(self, margin: float, options: OccupancyOptions) -> None:
         """Watch only sites that may be used, or mark the rim, with this margin or a smaller one."""
-        near = self.right[self.watched] < _clearance(margin) + options.slack
+        near = self.right[self.watched] < clearance(margin) + options.slack
         self.watched = self.watched[near]
 
     def explained(self, margin: float, depth: float, options: OccupancyOptions) -> Ints:
@@ -189,18 +232,28 @@ class _Places:
         the layer tapers steeply, horizon and rim are one.
         """
         beyond, thickness = self.beyond, self.half
-        hole = ~self.sites.occupied & (-beyond > np.minimum(depth, 0.6 * thickness))
-        good = (self.right < _clearance(margin)) & (np.abs(beyond) < options.band)
+        deep = (thickness > options.thin) & (-beyond > np.minimum(depth, 0.6 * thickness))
+        hole = (~self.sites.occupied & deep) | self._uncovered(options)
+        good = (self.right < clearance(margin)) & (np.abs(beyond) < options.band)
         good &= (thickness > options.thinnest) & (self.taper < options.taper)
         use = np.flatnonzero(good)
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=options.rim)[0]
         out: Ints = use[rim > options.rim]
         return out
 
+    def _uncovered(self, options: OccupancyOptions) -> Bools:
+        """Return which empty sites lie in a thin layer where no block is near, (n,)."""
+        beyond, occupied = self.beyond, self.sites.occupied
+        out: Bools = ~occupied & (beyond < 0) & (self.half <= options.thin)
+        if out.any():
+            blocks = self.flat[occupied & (beyond < 0.5)]
+            near = cKDTree(blocks).query(self.flat[out], distance_upper_bound=options.cover)[0]
+            out[out] = near > options.cover
+        return out
 
-def _views(sheet: Sheet, nodes: Floats, places: _Places, use: Ints) -> _Views:
-    t = places.t[use]
-    side = np.sign(t)
+
+def _views(sheet: Sheet, nodes: Floats, places: Places, use: Ints) -> _Views:
+    t, side = places.t[use], places.side[use]
     A = displacement_basis(sheet, nodes, places.U[use], places.normal[use] * side[:, None])
     H = sheet.grid.basis(places.flat[use])
     return _Views(side * t, places.sites.occupied[use], A, H)
@@ -228,10 +281,10 @@ def _step(
     pull = np.einsum("ij,ij->i", nodes, rough @ sheet.C)
     m = views.height - views.H @ half
     stiffness = stiff * rough.between(nodes)
-    z = _newton(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull)
+    z = separating_step(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull)
     m = m - views.A @ z
     even = (smooth_half / knots) ** 6 * fine
-    dh = _newton(views.H, m, views.occupied, margin, knots, even, even @ half)
+    dh = separating_step(views.H, m, views.occupied, margin, knots, even, even @ half)
     m = m - views.H @ dh
     wrong = np.where(views.occupied, m, -m)
     moved = sheet.with_coefficients(sheet.C + nodes * z[:, None])
@@ -239,7 +292,7 @@ def _step(
     return _Round(moved, half + dh, float((wrong > 0).mean()), depth)
 
 
-def _newton(
+def separating_step(
     A: sp.csr_array,
     m: Floats,
     occupied: Bools,

@@ -29,6 +29,7 @@ COLUMNS = (
     "angle_distortion",
     "symmetric_dirichlet",
     "flips",
+    "overlaps",
     "iterations",
     "stop",
     "seconds",
@@ -70,8 +71,10 @@ def compare(
     DataFrame
         One row per surface and flattener, with the columns of COLUMNS: ``area_error`` is E_s and
         ``edge_strain`` a root mean square; ``area_distortion`` and ``angle_distortion`` are 1 and
-        ``symmetric_dirichlet`` is 4 for an isometry (inf with a flipped triangle); ``seconds`` is
-        wall time.  A method that failed is a row without figures, and ``error`` says why.
+        ``symmetric_dirichlet`` is 4 for an isometry (inf with a flipped triangle); ``overlaps``
+        counts the pairs of border edges whose images meet; ``seconds`` is wall time.  A method
+        that failed, or whose answer is not one-to-one and cannot be repaired, is a row without
+        figures, and ``error`` says why.
 
     Raises
     ------
@@ -98,7 +101,7 @@ def compare(
                 progress(f"{label} surface by {name}")
             rows.append(_row(label, as_trimesh(mesh), name, (options or {}).get(name)))
     table = pd.DataFrame(rows, columns=list(COLUMNS))
-    return table.astype({"flips": "Int64", "iterations": "Int64"})
+    return table.astype(dict.fromkeys(("flips", "overlaps", "iterations"), "Int64"))
 
 
 def _surfaces(
@@ -159,6 +162,7 @@ def _figures(flat: Flattening) -> dict[str, Any]:
         "angle_distortion": measures.angle_distortion(V, F, uv),
         "symmetric_dirichlet": measures.symmetric_dirichlet(V, F, uv),
         "flips": flat.flips,
+        "overlaps": flat.overlaps,
         "iterations": flat.iterations,
         "stop": str(flat.stop),
         "note": flat.note,

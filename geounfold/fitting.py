@@ -125,7 +125,8 @@ def _flattener(options: UnfoldOptions) -> Callable[[TriMesh, Floats | None], Fla
     """Return the chosen flattener; a start is passed on where the method uses one."""
 
     def run(mesh: TriMesh, start: Floats | None) -> Flattening:
-        return flatten(mesh, options.flattener, start=start)
+        # As it comes: the sheet tries nearer surfaces where one folds over.
+        return flatten(mesh, options.flattener, start=start, repair=False)
 
     return run
 

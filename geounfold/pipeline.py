@@ -526,5 +526,6 @@ def _flattening_summary(flattening: Flattening) -> dict[str, Any]:
         "area_change": ends(flattening.area_error)[-1:],
         "edge_strain": ends(flattening.edge_error)[-1:],
         "flips": flattening.flips,
+        "overlaps": flattening.overlaps,
         "note": flattening.note,
     }

@@ -462,7 +462,7 @@ def _surfaces(summary: Mapping[str, Any]) -> str:
     for name, how in _mapping(summary.get("flattening")).items():
         size = _mapping(summary.get(name))
         rows.append({"surface": name, **size, **{k: v for k, v in _mapping(how).items() if v}})
-        rows[-1]["flips"] = _mapping(how).get("flips")
+        rows[-1].update({k: _mapping(how).get(k) for k in ("flips", "overlaps")})
     return _table(rows)
 
 

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geounfold.errors import OptionError
+from geounfold.flattening._ladder import one_to_one
 from geounfold.flattening._problem import Problem, make_problem, upright
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.arap import ArapOptions, arap
 from geounfold.flattening.initial import check_disk
 from geounfold.flattening.initial import tutte as _tutte
 from geounfold.flattening.lscm import LscmOptions, lscm
+from geounfold.flattening.scaf import ScafOptions, scaf
+from geounfold.flattening.slim import SlimOptions, slim
 from geounfold.flattening.spring import SpringOptions, spring
 from geounfold.flattening.spring_dynamic import SpringDynamicOptions, spring_dynamic
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
@@ -26,6 +29,8 @@ __all__ = [
     "Flattener",
     "Flattening",
     "LscmOptions",
+    "ScafOptions",
+    "SlimOptions",
     "SpringDynamicOptions",
     "SpringOptions",
     "Stop",
@@ -48,12 +53,16 @@ class Flattener:
         Whether it works on edge lengths alone, so that other rest lengths can be given.
     options : type
         Its options, a frozen dataclass that checks itself.
+    keeps : str
+        What it keeps where the surface allows that, and nearly keeps elsewhere: ``lengths`` or
+        ``angles``.
     """
 
     name: str
     function: Callable[[Problem, Floats | None, Any], Flattening]
     intrinsic: bool
     options: type
+    keeps: str = "lengths"
 
 
 #: The methods by name.
@@ -63,7 +72,9 @@ FLATTENERS: dict[str, Flattener] = {
         Flattener("spring", spring, True, SpringOptions),
         Flattener("spring_dynamic", spring_dynamic, True, SpringDynamicOptions),
         Flattener("arap", arap, False, ArapOptions),
-        Flattener("lscm", lscm, False, LscmOptions),
+        Flattener("lscm", lscm, False, LscmOptions, "angles"),
+        Flattener("slim", slim, False, SlimOptions),
+        Flattener("scaf", scaf, False, ScafOptions),
     )
 }
 
@@ -75,8 +86,9 @@ def flatten(
     start: ArrayLike | None = None,
     rest: ArrayLike | None = None,
     options: Any = None,
+    repair: bool = True,
 ) -> Flattening:
-    """Lay a surface flat.
+    """Lay a surface flat, one-to-one.
 
     Parameters
     ----------
@@ -93,11 +105,20 @@ def flatten(
         vertices' unit; by default its length in the mesh.  For intrinsic methods alone.
     options : dataclass, optional
         The method's options; by default its defaults.
+    repair : bool
+        Whether an answer with triangles folded over or a border that overlaps itself is
+        repaired, or is an error where that fails.  False returns it as it is, its ``flips`` and
+        ``overlaps`` counted.
 
     Returns
     -------
     Flattening
         Flat positions in the mesh's unit and vertex order, centred at zero, never mirrored.
+        With ``repair`` the map is proved to be one-to-one: every triangle counter-clockwise and
+        no two border edges meeting, by exact predicates, suffice (Lipman 2014, arXiv
+        1310.0955).  ``note`` says what had to be done: the vertices about a few folded
+        triangles moved (Garanzha et al. 2021, arXiv 2102.03069); or, for methods that keep
+        lengths, libigl's SLIM or scaffold maps from Tutte's embedding instead.
 
     Raises
     ------
@@ -107,14 +128,14 @@ def flatten(
         Unknown method, options of another method, a start or rest lengths of a wrong shape or
         value, or rest lengths for a method that cannot use them.
     FlatteningError
-        The method gave no valid answer.
+        The method gave no valid answer, or one that is not one-to-one and cannot be repaired.
 
     Examples
     --------
     >>> V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> flat = flatten((V, np.array([[0, 1, 2], [0, 2, 3]])))
-    >>> flat.flips, str(flat.stop)
-    (0, 'converged')
+    >>> flat.flips, flat.overlaps, str(flat.stop)
+    (0, 0, 'converged')
     """
     if method not in FLATTENERS:
         raise OptionError(f"unknown flattener {method!r}, choose from {', '.join(FLATTENERS)}")
@@ -124,9 +145,9 @@ def flatten(
         wanted, given = flattener.options.__name__, type(chosen).__name__
         raise OptionError(f"{method} takes options of type {wanted}, not {given}")
     problem = _problem(mesh, rest, flattener)
-    return flattener.function(
-        problem, _checked_start(start, len(problem.mesh.V), problem.mesh.F), chosen
-    )
+    begin = _checked_start(start, len(problem.mesh.V), problem.mesh.F)
+    flat = flattener.function(problem, begin, chosen)
+    return one_to_one(problem, flat, flattener.keeps == "lengths") if repair else flat
 
 
 def tutte(mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None = None) -> Floats:

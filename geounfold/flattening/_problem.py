@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geounfold.flattening._border import turned_over
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.geometry import lengths, triangle_areas, unique_edges
 from geounfold.mesh import Floats, Ints, TriMesh
@@ -39,6 +40,8 @@ class Problem:
         Area of each face by its rest lengths; positive.
     size : float
         Twice the largest distance of a vertex from the vertices' mean.
+    own : bool
+        Whether the rest lengths are the mesh's own.
     """
 
     mesh: TriMesh
@@ -48,6 +51,7 @@ class Problem:
     corners: Complex
     areas: Floats
     size: float
+    own: bool
 
 
 def make_problem(mesh: TriMesh, loops: tuple[Ints, ...], rest: Floats | None) -> Problem:
@@ -61,7 +65,7 @@ def make_problem(mesh: TriMesh, loops: tuple[Ints, ...], rest: Floats | None) ->
     else:
         areas = np.asarray(corners[:, 1].real * corners[:, 2].imag / 2)
     radius = np.linalg.norm(mesh.V - mesh.V.mean(axis=0), axis=1).max()
-    return Problem(mesh, loops, edges, wanted, corners, areas, 2 * float(radius))
+    return Problem(mesh, loops, edges, wanted, corners, areas, 2 * float(radius), rest is None)
 
 
 def edge_of_side(F: Ints, edges: Ints, n: int) -> Ints:
@@ -153,9 +157,10 @@ def finish(
         method=method,
         stop=stop,
         iterations=iterations,
-        flips=flip_count(flat, problem.mesh.F),
+        flips=len(turned_over(flat, problem.mesh.F)),
         energy=np.array(history.energy),
         area_error=np.array(history.area_error),
         edge_error=np.array(history.edge_error),
         note=note,
+        loops=problem.loops,
     )

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
-from geounfold.mesh import Floats, TriMesh
+from geounfold.flattening._border import Border, border_of
+from geounfold.mesh import Floats, Ints, TriMesh
 
 
 class Stop(StrEnum):
@@ -17,6 +19,7 @@ class Stop(StrEnum):
     MAX_ITER = "max_iter"
     DIRECT = "direct"
     THESIS_RULE = "thesis_rule"
+    STALLED = "stalled"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +41,14 @@ class Flattening:
         Steps taken; 0 for a direct solve.
     energy, area_error, edge_error : (k,) float
         One value per recorded step: the method's energy, the relative area difference E_s
-        (Wang 2002) and the root mean square edge strain.
+        (Wang 2002) and the root mean square edge strain.  Where a fall-back gave the answer,
+        they and ``stop`` are the fall-back's.
     flips : int
-        Triangles whose flat area is not positive.
+        Triangles whose flat area is not positive, by an exact predicate.
     note : str
         What the method had to do beyond its plain course (a fall-back, a safeguard); else empty.
+    loops : tuple of (b,) int
+        Border loops in face direction, the longest first.
     """
 
     mesh: TriMesh
@@ -55,3 +61,27 @@ class Flattening:
     area_error: Floats = field(default_factory=lambda: np.empty(0))
     edge_error: Floats = field(default_factory=lambda: np.empty(0))
     note: str = ""
+    loops: tuple[Ints, ...] = ()
+
+    @cached_property
+    def border(self) -> Border:
+        """Return what the flat border shows; worked out when first asked for."""
+        return border_of(self.uv, self.loops)
+
+    @property
+    def overlaps(self) -> int:
+        """Return the number of pairs of border edges whose flat images meet, by exact tests.
+
+        Where there are none, the border loops that run the wrong way round (a hole turned inside
+        out) are counted instead.
+        """
+        return self.border.overlaps
+
+    @property
+    def one_to_one(self) -> bool:
+        """Return whether the flat map is proved to be one-to-one: no flips and no overlaps.
+
+        An orientation-preserving map, linear on triangles, of a disk (holes allowed) is
+        one-to-one where its border is (Lipman, arXiv 1310.0955); ``_border`` says why.
+        """
+        return self.flips == 0 and self.overlaps == 0

@@ -32,9 +32,12 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     """
     _check_faces(mesh)
     F, n = mesh.F, len(mesh.V)
-    if not _oriented(F, n):
-        raise MeshError(NOT_MANIFOLD)
     parts = int(backend.face_components(F).max()) + 1
+    bad = _misfit(F, n)
+    if bad >= 0:
+        at = ", ".join(f"{x:.6g}" for x in mesh.V[bad])
+        also = f" (and it has {parts} components)" if parts > 1 else ""
+        raise MeshError(f"{NOT_MANIFOLD}, first at vertex {bad} ({at}){also}")
     if parts > 1:
         raise MeshError(f"the surface has {parts} components, flatten each one alone")
     loops = backend.boundary_loops(F)
@@ -52,16 +55,18 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     return tuple(loops[k] for k in order)
 
 
-def _oriented(F: Ints, n: int) -> bool:
-    """Return whether no directed edge is used twice and no vertex lies on two borders."""
+def _misfit(F: Ints, n: int) -> int:
+    """Return a vertex with a directed edge used twice, or on two borders; -1 for none."""
     sides = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     key = np.sort(sides[:, 0] * n + sides[:, 1])
-    if (key[1:] == key[:-1]).any():
-        return False
+    twice = key[1:] == key[:-1]
+    if twice.any():
+        return int(key[int(np.argmax(twice))]) // n
     back = sides[:, 1] * n + sides[:, 0]
     at = np.minimum(np.searchsorted(key, back), len(key) - 1)
     border = sides[key[at] != back, 0]
-    return int(np.bincount(border, minlength=n).max()) <= 1
+    shared = np.bincount(border, minlength=n) > 1
+    return int(np.argmax(shared)) if shared.any() else -1
 
 
 def _check_faces(mesh: TriMesh) -> None:

@@ -138,7 +138,7 @@ def fit_body(
 
 def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
     """Return near-isometric parameters of a surface, (n, 2): springs, not to the last digit."""
-    return flatten_surface(mesh, "spring", start=start, options=_COARSE).uv
+    return flatten_surface(mesh, "spring", start=start, options=_COARSE, repair=False).uv
 
 
 def _fitted(

@@ -206,7 +206,8 @@ def _checked_up(up: Floats | None) -> Floats | None:
 def _flat(mesh: TriMesh, options: ThesisOptions) -> Flattening:
     """Return one side laid flat, starting from its plan as Wang's springs do."""
     start = mesh.V[:, :2] - mesh.V[:, :2].mean(axis=0)
-    return flatten(mesh, options.flattener, start=start, options=options.flattener_options)
+    how = options.flattener_options
+    return flatten(mesh, options.flattener, start=start, options=how, repair=False)
 
 
 def _moved(flat: Flattening, source: Floats, target: Floats) -> Flattening:

@@ -1,0 +1,56 @@
+"""Isometric flattening without flips: SLIM (Rabinovich et al. 2017) by libigl."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from geounfold.backends.injective import SlimSteps
+from geounfold.errors import BackendError, FlatteningError
+from geounfold.flattening._border import turned_over
+from geounfold.flattening._injective import InjectiveOptions, descend
+from geounfold.flattening._problem import Problem, finish
+from geounfold.flattening._result import Flattening
+from geounfold.flattening.initial import tutte
+from geounfold.mesh import Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlimOptions(InjectiveOptions):
+    """Options of ``slim``; see InjectiveOptions."""
+
+
+def slim(problem: Problem, start: Floats | None, options: SlimOptions) -> Flattening:
+    """Flatten by libigl's SLIM: the mean of s1^2 + s2^2 + 1/s1^2 + 1/s2^2 over the folded area.
+
+    The energy is infinite where a triangle has lost its area, and every step stops short of that:
+    nothing flips.  The border may still cross itself.  Each step is checked by an exact
+    predicate; one that is not finite or flips a triangle ends the run at the step before it,
+    which the note tells.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface; its rest lengths are its edges' own.
+    start : (n, 2) float or None
+        Flat positions to start from; None, or flipped triangles, take Tutte's embedding.
+    options : SlimOptions
+        See there.
+    """
+    F, uv, note = problem.mesh.F, start, ""
+    if uv is not None and len(turned_over(uv, F)):
+        uv, note = None, "the start has flipped triangles: from Tutte's embedding instead"
+    uv = tutte(problem) if uv is None else uv
+    if len(turned_over(uv, F)):
+        raise FlatteningError(
+            "slim: Tutte's embedding has triangles too small to tell from folded ones: "
+            "remesh the surface"
+        )
+    try:
+        steps = SlimSteps(problem.mesh.V, F, uv)
+    except BackendError as err:
+        raise FlatteningError(f"slim: {err}") from err
+    run = descend(problem, uv, steps, options, lambda flat: not len(turned_over(flat, F)))
+    if not run.steps:
+        raise FlatteningError(f"slim: {run.note}")
+    notes = "; ".join(filter(None, [note, run.note]))
+    return finish(problem, run.uv, "slim", run.stop, run.steps, run.history, notes)

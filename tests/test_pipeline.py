@@ -234,7 +234,7 @@ def test_torn_blocks_are_an_error_unless_allowed():
     # runs into the other limb, and no tetrahedron is inverted.
     body = simulate("recumbent", blocks=12000).folded
     # Since boundaries are examined, the map is refused before its blocks are.
-    with pytest.raises(ControlMeshError, match="torn from their neighbours|not one-to-one"):
+    with pytest.raises(ControlMeshError, match=r"torn from their neighbours|not one-to-one"):
         gu.unfold(body)
     u = gu.unfold(body, allow_uncertified=True)
     assert u.summary()["torn"] > 0

@@ -17,6 +17,7 @@ from geounfold._version import __version__
 if TYPE_CHECKING:
     from geounfold.comparison import compare
     from geounfold.control import ControlMesh
+    from geounfold.drillholes import DrillHoles, read_drillholes
     from geounfold.errors import GeounfoldError, InputError
     from geounfold.flattening import FLATTENERS, Flattening, flatten
     from geounfold.mapping import UnfoldingMap, load
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "compare": "comparison",
     "ControlMesh": "control",
+    "DrillHoles": "drillholes",
+    "read_drillholes": "drillholes",
     "GeounfoldError": "errors",
     "InputError": "errors",
     "FLATTENERS": "flattening",
@@ -51,6 +54,7 @@ _HOMES = {
 __all__ = [
     "FLATTENERS",
     "ControlMesh",
+    "DrillHoles",
     "Flattening",
     "GeounfoldError",
     "InputError",
@@ -67,6 +71,7 @@ __all__ = [
     "load",
     "neighbours",
     "nmd",
+    "read_drillholes",
     "simulate",
     "unfold",
 ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geounfold.cli.console import Console
+from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, read_points, read_surface, write_json
 from geounfold.io.coordinates import Triple, parse_columns
@@ -17,7 +18,7 @@ from geounfold.io.surfaces import MESH_ENDINGS
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
-    from geounfold.mapping import Carried
+    from geounfold.mapping import Carried, UnfoldingMap
     from geounfold.mesh import Floats, TriMesh
     from geounfold.options import UnfoldOptions
 
@@ -34,8 +35,9 @@ _MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighb
 
 def unfold(args: Namespace, console: Console) -> None:
     """Unfold a body and write everything that was asked for."""
-    if (args.samples is None) != (args.samples_out is None):
+    if args.holes is None and (args.samples is None) != (args.samples_out is None):
         raise OptionError("--samples and --samples-out belong together: give both or neither")
+    check_hole_options(args)
     outputs = Outputs.planned(
         {
             "--output": (args.output, TABLE_ENDINGS),
@@ -44,8 +46,9 @@ def unfold(args: Namespace, console: Console) -> None:
             "--mesh": (args.mesh, _VTU),
             "--report": (args.report, _HTML),
             "--samples-out": (args.samples_out, TABLE_ENDINGS),
+            "--traces-out": (args.traces_out, TRACE_ENDINGS),
         },
-        _given(args.points, args.samples, args.top, args.bottom),
+        _given(args.points, args.samples, args.top, args.bottom, *(args.holes or ())),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
@@ -53,6 +56,7 @@ def unfold(args: Namespace, console: Console) -> None:
         _check_pictures(console)
     table = _read(args.points, args, console)
     samples = _read_samples(args, console)
+    holes = read_holes(args, console)
     surfaces = {
         side: None if path is None else read_surface(path)
         for side, path in (("top", args.top), ("bottom", args.bottom))
@@ -61,15 +65,22 @@ def unfold(args: Namespace, console: Console) -> None:
 
     result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
     summary = {**result.summary(), "input": table.facts()}
+    warnings = summary.get("warnings", [])
     if samples is not None:
         summary["samples"] = samples.facts()
     columns = _columns(_UNFOLDED, result.carried) | result.columns
     carried = None if samples is None else _columns(_UNFOLDED, result.map.carry(samples.points))
+    traced = {} if holes is None else holes.carried(_flat(result.map))
+    if holes is not None:
+        summary["drillholes"] = holes.facts(traced)
+        summary["warnings"] = [*warnings, *holes.holes.messages()]  # said when they were read
     console.stage("writing")
     with outputs.writing() as parts:
         table.write(parts["--output"], columns)
         if samples is not None and carried is not None:
             samples.write(parts["--samples-out"], carried)
+        if holes is not None:
+            holes.write(parts, traced)
         if "--map" in parts:
             result.save(parts["--map"])
         if "--mesh" in parts:
@@ -82,36 +93,68 @@ def unfold(args: Namespace, console: Console) -> None:
             from geounfold.report import write_report
 
             write_report(parts["--report"], summary, table.points, result.points, columns)
-    for warning in summary.get("warnings", []):
+    for warning in warnings:
         console.warn(str(warning))
     if carried is not None:
         _warn_of_outside(args.samples, carried, console)
+    for name, columns in traced.items():
+        _warn_of_outside(f"the holes' {name}", columns, console)
     console.done(f"{len(table)} points unfolded into {args.output}")
 
 
 def carry(args: Namespace, console: Console) -> None:
-    """Carry other points with a saved map, to the flat side or back."""
+    """Carry other points with a saved map, to the flat side or back; or drill-holes."""
+    check_hole_options(args)
+    if (args.points is None) != (args.output is None):
+        raise OptionError(
+            "map needs POINTS and -o OUT, or --holes with --samples-out or --traces-out"
+        )
+    if args.holes is None and args.samples_out is not None:
+        raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    if args.holes is not None and args.inverse:
+        raise OptionError("--holes are where they were drilled: without --inverse")
     outputs = Outputs.planned(
-        {"--output": (args.output, TABLE_ENDINGS)},
-        [args.map, args.points],
+        {
+            "--output": (args.output, TABLE_ENDINGS),
+            "--samples-out": (args.samples_out, TABLE_ENDINGS),
+            "--traces-out": (args.traces_out, TRACE_ENDINGS),
+        },
+        _given(args.map, args.points, *(args.holes or ())),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
     existing_file(Path(args.map))
-    table = _read(args.points, args, console, prefer=(_UNFOLDED,) if args.inverse else ())
+    prefer = (_UNFOLDED,) if args.inverse else ()
+    table = None if args.points is None else _read(args.points, args, console, prefer=prefer)
+    holes = read_holes(args, console)
     from geounfold import mapping
 
     saved = mapping.load(args.map)
     console.stage("carrying points")
-    if args.inverse:
+    columns: dict[str, Any] = {}
+    if table is not None and args.inverse:
         columns = _columns(_FOLDED, saved.carry(table.points, inverse=True))
         del columns["stratigraphic"]
-    else:
+    elif table is not None:
         columns = _columns(_UNFOLDED, saved.carry(table.points))
+    traced = {} if holes is None else holes.carried(_flat(saved))
     with outputs.writing() as parts:
-        table.write(parts["--output"], columns)
-    _warn_of_outside(args.points, columns, console)
-    console.done(f"{len(table)} points carried into {args.output}")
+        if table is not None:
+            table.write(parts["--output"], columns)
+        if holes is not None:
+            holes.write(parts, traced)
+    if table is not None:
+        _warn_of_outside(args.points, columns, console)
+    for name, result in traced.items():
+        _warn_of_outside(f"the holes' {name}", result, console)
+    carried = {args.output: columns, args.samples_out: traced.get("samples", {})}
+    counts = [f"{len(c['location'])} points carried into {p}" for p, c in carried.items() if c]
+    console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
+
+
+def _flat(saved: UnfoldingMap) -> Callable[[Floats], dict[str, Any]]:
+    """Return what carries points to the flat side, into output columns."""
+    return lambda points: _columns(_UNFOLDED, saved.carry(points))
 
 
 def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:

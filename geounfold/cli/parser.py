@@ -40,6 +40,13 @@ with --inverse (columns unfolded_x/y/z are taken first where they exist):
 Every input column and row comes back in order. An input column called as a result is replaced
 in its place."""
 )
+_HOLES = """\
+
+drill-holes: --samples-out has hole, from, to, x, y, z of each interval's midpoint (or composite's),
+  position (surveyed, or extrapolated straight on beyond a hole's surveys), coverage of composites,
+  the grades, and the results; --traces-out has hole, depth, x, y, z, position and the results along
+  every hole. As .vtp it holds lines in the folded space, with the other as point array unfolded.
+  Rows that cannot be used are named on stderr and in the summary."""
 _COMPARE = """\
 rows: the top, bottom and mid surface of a body, or the surface given, by each flattener
 columns:
@@ -92,7 +99,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     SystemExit
         After ``--help`` and ``--version``, with status 0.
     """
-    return build_parser().parse_args(_joined(argv))
+    return build_parser(holes="--holes" in argv).parse_args(_joined(argv))
 
 
 def _joined(argv: Sequence[str]) -> list[str]:
@@ -106,8 +113,8 @@ def _joined(argv: Sequence[str]) -> list[str]:
     return joined
 
 
-def build_parser() -> Parser:
-    """Return the parser of all commands."""
+def build_parser(*, holes: bool = False) -> Parser:
+    """Return the parser of all commands; with `holes`, `map` takes these instead of POINTS."""
     parser = Parser(
         prog="geounfold",
         description="Takes the folds out of an ore body, and puts them back.",
@@ -117,7 +124,7 @@ def build_parser() -> Parser:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     common = _common()
     _add_unfold(commands, common)
-    _add_map(commands, common)
+    _add_map(commands, common, holes=holes)
     _add_compare(commands, common)
     _add_quality(commands, common)
     _add_simulate(commands, common)
@@ -212,7 +219,7 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
 
 
 def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
-    parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD)
+    parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD + _HOLES)
     parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_TABLES}")
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_TABLES)
     parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
@@ -222,7 +229,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
         "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
     )
     parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_TABLES}")
-    parser.add_argument("--samples-out", metavar="Q", help="where they go")
+    parser.add_argument("--samples-out", metavar="Q", help="where they, or the holes' samples, go")
     parser.add_argument(
         "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
     )
@@ -231,6 +238,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--bottom", metavar="B", help="the bottom surface")
     _add_columns(parser)
+    _add_holes(parser)
     _add_model(parser).add_argument(
         "--allow-uncertified",
         action="store_true",
@@ -239,13 +247,57 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_map(commands: Any, common: argparse.ArgumentParser) -> None:
-    parser = _add_command(commands, "map", "carry other points with a saved map", common, _MAP)
+def _add_holes(parser: argparse.ArgumentParser) -> Any:
+    """Add the options that drill-holes have, and return their group."""
+    group = parser.add_argument_group("drill-holes")
+    group.add_argument(
+        "--holes",
+        nargs=3,
+        metavar=("COLLAR", "SURVEY", "ASSAY"),
+        help=f"the three tables: {_TABLES}; desurveyed by minimum curvature",
+    )
+    group.add_argument(
+        "--composite",
+        metavar="LENGTH",
+        help="average grades over this length along each hole, counted from the collar",
+    )
+    group.add_argument(
+        "--dip-positive-down",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="whether dips point down where positive; taken from their sign, where all have one",
+    )
+    group.add_argument(
+        "--holes-columns",
+        metavar="FIELD=NAME,...",
+        help="columns that are not found by name; fields: hole, x, y, z, depth, at, azimuth, dip, "
+        "from, to",
+    )
+    group.add_argument(
+        "--strict",
+        action="store_true",
+        help="refuse where a row of the tables would be left out, cut or taken otherwise than it "
+        "stands",
+    )
+    group.add_argument(
+        "--traces-out", metavar="T", help=f"the holes' paths in both spaces: {_TABLES}, or .vtp"
+    )
+    return group
+
+
+def _add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> None:
+    summary = "carry other points or drill-holes with a saved map"
+    parser = _add_command(commands, "map", summary, common, _MAP + _HOLES)
     parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
-    parser.add_argument("points", metavar="POINTS", help=_TABLES)
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_TABLES)
+    # An optional POINTS would be missed behind an option, so it is there or it is not.
+    if holes:
+        parser.set_defaults(points=None)
+    else:
+        parser.add_argument("points", metavar="POINTS", help=f"{_TABLES}; or give --holes instead")
+    parser.add_argument("-o", "--output", metavar="OUT", help=f"where POINTS go: {_TABLES}")
     parser.add_argument("--inverse", action="store_true", help="from unfolded to folded")
     _add_columns(parser)
+    _add_holes(parser).add_argument("--samples-out", metavar="Q", help="where samples go")
 
 
 def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ import pandas as pd
 from geounfold.errors import InputError, OptionError
 from geounfold.io._text import counted, listing, shown
 from geounfold.io.tables import objects
-from geounfold.mesh import Floats
+from geounfold.mesh import Bools, Floats
 
 Triple = tuple[str, str, str]
 
@@ -54,7 +54,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
 
 
-def _plain(name: object) -> str:
+def plain_name(name: object) -> str:
     """Return a column name without case, unit in brackets, spaces and underscores."""
     bare = re.sub(r"[(\[][^)\]]*[)\]]\s*$", "", str(name))
     return re.sub(r"[\s_\-.]+", "", bare).casefold()
@@ -106,7 +106,7 @@ def coordinate_columns(
         if len({a, b, c}) != 3:
             raise InputError(f"{source}: the columns {listing(columns)} are not three columns")
         return a, b, c
-    plain = [_plain(name) for name in names]
+    plain = [plain_name(name) for name in names]
     for tier in (_FAMILIES, _MIXED):
         found = [family for family in tier if set(family) <= set(plain)]
         if found:
@@ -170,37 +170,54 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
         A value is not a number: the first one is named with its row.
     """
     name = shown(column.name)
-    kind = column.dtype
-    if pd.api.types.is_bool_dtype(kind) or pd.api.types.is_datetime64_any_dtype(kind):
-        raise InputError(f"{source}: column '{name}' is not numeric: it holds {kind}")
-    if pd.api.types.is_numeric_dtype(kind):
-        return np.asarray(column.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
-    text = objects(column)
-    try:
-        values = text.astype(np.float64)
-    except (TypeError, ValueError):
-        return _with_gaps(text, name, source)
-    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000, no other tool does
-        return _with_gaps(text, name, source)
-    return np.asarray(values, dtype=np.float64)
-
-
-def _with_gaps(text: np.ndarray, name: str, source: str) -> Floats:
-    """Return numbers where some values are missing, or an error naming what is no number."""
-    words = pd.Series(text, dtype=object).astype(str).str.strip()
-    missing = words.str.casefold().isin(_MISSING).to_numpy()
-    good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
-    bad = np.flatnonzero(~missing & ~good)
+    if _has_other_type(column):
+        raise InputError(f"{source}: column '{name}' is not numeric: it holds {column.dtype}")
+    values, wrong = readable_numbers(column)
+    bad = np.flatnonzero(wrong)
     if len(bad):
-        first = words.iloc[bad[0]]
+        first = str(objects(column)[bad[0]]).strip()
         others = f" ({counted(len(bad), 'such value')})" if len(bad) > 1 else ""
         raise InputError(
             f"{source}: column '{name}' is not numeric: data row {bad[0] + 1} has "
             f"'{shown(first)}'{others}{_hint(first)}"
         )
-    values = np.full(len(words), np.nan)
-    values[~missing] = words.to_numpy(dtype=object)[~missing].astype(np.float64)
     return values
+
+
+def readable_numbers(column: pd.Series) -> tuple[Floats, Bools]:
+    """Return a column's values, (n,) float, and which of them are there but no numbers, (n,) bool.
+
+    Both these and missing ones are NaN.
+    """
+    kind = column.dtype
+    if _has_other_type(column):
+        return np.full(len(column), np.nan), column.notna().to_numpy(dtype=bool)
+    if pd.api.types.is_numeric_dtype(kind):
+        values = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        return np.asarray(values, dtype=np.float64), np.zeros(len(column), dtype=bool)
+    text = objects(column)
+    try:
+        values = text.astype(np.float64)
+    except (TypeError, ValueError):
+        return _with_gaps(text)
+    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000, no other tool does
+        return _with_gaps(text)
+    return np.asarray(values, dtype=np.float64), np.zeros(len(column), dtype=bool)
+
+
+def _has_other_type(column: pd.Series) -> bool:
+    kind = column.dtype
+    return pd.api.types.is_bool_dtype(kind) or pd.api.types.is_datetime64_any_dtype(kind)
+
+
+def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
+    """Return numbers where some values are missing or no numbers, and which are the latter."""
+    words = pd.Series(text, dtype=object).astype(str).str.strip()
+    missing = words.str.casefold().isin(_MISSING).to_numpy()
+    good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
+    values = np.full(len(words), np.nan)
+    values[good & ~missing] = words.to_numpy(dtype=object)[good & ~missing].astype(np.float64)
+    return values, np.asarray(~missing & ~good)
 
 
 def _hint(word: str) -> str:

@@ -1,0 +1,20 @@
+"""Drill-holes: collar, survey and assay tables to samples and traces in space.
+
+Stages, each a module: `tables` finds columns and reads numbers, `checks` names the rows that
+cannot be used, `desurvey` computes paths by minimum curvature, `composite` averages grades over
+equal lengths; `holes` puts them together.
+"""
+
+from geounfold.drillholes.composite import RESIDUALS, CompositeOptions
+from geounfold.drillholes.findings import Finding
+from geounfold.drillholes.holes import DrillHoles, read_drillholes
+from geounfold.drillholes.tables import ALIASES
+
+__all__ = [
+    "ALIASES",
+    "RESIDUALS",
+    "CompositeOptions",
+    "DrillHoles",
+    "Finding",
+    "read_drillholes",
+]

@@ -1,0 +1,424 @@
+"""Which rows of the tables can be used: every other one is named, and what was done with it.
+
+Nothing is mended by guessing. Rows are left out or cut as each check states; a hole that has
+assays and cannot be placed is an error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from geounfold.drillholes.desurvey import directions, dogleg
+from geounfold.drillholes.findings import ERROR, NOTE, WARNING, Log, Severity
+from geounfold.drillholes.tables import HoleTable
+from geounfold.errors import InputError
+from geounfold.mesh import Bools, Floats, Ints
+
+LEFT_OUT = "left out"
+
+_FAR = 3.0  # times the deepest assay of a hole: a survey below that, and below all assays, is none
+_SLACK = 1.05  # of the depth that the collar table gives: how far below it a survey may lie
+_ROUNDING = 1e-6  # of a depth: differences that are none
+_SHARP = 90.0  # degrees between two stations that no drill turns
+_REVERSED = 179.0  # degrees beyond which no arc is defined
+
+
+@dataclass(frozen=True, eq=False)
+class Collars:
+    """Where holes begin, one row for each.
+
+    Attributes
+    ----------
+    source : str
+        The table.
+    names : (h,) object
+        Names of holes.
+    points : (h, 3) float
+        Coordinates.
+    depth : (h,) float
+        Length of the hole, NaN where not given.
+    azimuth, dip : (h,) float
+        Direction at the collar, degrees as in the table; NaN where not given.
+    row : (h,) int
+        Data rows.
+    """
+
+    source: str
+    names: np.ndarray
+    points: Floats
+    depth: Floats
+    azimuth: Floats
+    dip: Floats
+    row: Ints
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def find(self, names: np.ndarray) -> Ints:
+        """Return the holes of names, (n,); -1 where there is none."""
+        return np.asarray(pd.Index(self.names).get_indexer(pd.Index(names)), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Stations:
+    """Survey stations, sorted by hole and depth.
+
+    Attributes
+    ----------
+    hole : (s,) int
+        Index of the hole among the collars.
+    depth : (s,) float
+        Length along the hole.
+    azimuth, dip : (s,) float
+        Degrees; dip as in the table.
+    row : (s,) int
+        Data rows of the survey table; 0 where the collar table gave the direction.
+    """
+
+    hole: Ints
+    depth: Floats
+    azimuth: Floats
+    dip: Floats
+    row: Ints
+
+    def kept(self, keep: Bools) -> Stations:
+        """Return some of the stations."""
+        return Stations(
+            self.hole[keep], self.depth[keep], self.azimuth[keep], self.dip[keep], self.row[keep]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Intervals:
+    """Assayed intervals, sorted by hole and depth, that do not overlap.
+
+    Attributes
+    ----------
+    hole : (n,) int
+        Index of the hole among the collars.
+    start, end : (n,) float
+        Lengths along the hole.
+    position : (n,) int
+        Place of each in the table as read.
+    """
+
+    hole: Ints
+    start: Floats
+    end: Floats
+    position: Ints
+
+    def kept(self, keep: Bools) -> Intervals:
+        """Return some of the intervals."""
+        return Intervals(self.hole[keep], self.start[keep], self.end[keep], self.position[keep])
+
+
+def checked_collars(table: HoleTable, assayed: set[str], log: Log) -> Collars:
+    """Return one collar for each hole that has coordinates.
+
+    A name that is there twice with the same coordinates keeps its first row. With other
+    coordinates no one can say where the hole is: none of its rows is kept.
+    """
+    points = np.column_stack([table.numbers[axis] for axis in "xyz"])
+    whole = np.isfinite(points).all(axis=1)
+    for i in np.flatnonzero(~whole):
+        _add(log, table, i, "collar without coordinates", _grave(table.hole[i], assayed))
+    frame = pd.DataFrame(points, columns=list("xyz")).assign(hole=table.hole)[whole]
+    again = frame["hole"].duplicated()
+    places = frame.drop_duplicates().groupby("hole", sort=False)["x"].size()
+    moved = frame["hole"].isin(places.index[places > 1])
+    for i in frame.index[again & ~moved]:
+        _add(log, table, i, "duplicate collar with the same coordinates", WARNING)
+    for i in frame.index[again & moved]:
+        grave = _grave(table.hole[i], assayed)
+        _add(log, table, i, "duplicate collar with other coordinates", grave, "hole left out")
+    at = frame.index[~again & ~moved].to_numpy()
+    if not len(at):
+        raise InputError(f"{table.source}: no hole has one collar with coordinates")
+    for i in at[frame.loc[at, ["x", "y", "z"]].duplicated().to_numpy()]:
+        _add(log, table, i, "collar in the same place as another hole's", NOTE, "both kept")
+    missing = np.full(len(table), np.nan)
+    depth = table.numbers.get("depth", missing)[at].copy()
+    for i in at[depth <= 0]:
+        text = f"{table.numbers['depth'][i]:g}"
+        _add(log, table, i, "hole of no depth", WARNING, "depth taken as missing", text)
+    depth[depth <= 0] = np.nan
+    azimuth, dip = (table.numbers.get(n, missing)[at] for n in ("azimuth", "dip"))
+    return Collars(table.source, table.hole[at], points[at], depth, azimuth, dip, table.row[at])
+
+
+def checked_intervals(table: HoleTable, log: Log) -> tuple[Bools, np.ndarray]:
+    """Return which intervals have a length, and the names of holes that have one."""
+    start, end = table.numbers["from"], table.numbers["to"]
+    good = np.ones(len(table), dtype=bool)
+    for check, bad in (
+        ("interval without from or to", ~(np.isfinite(start) & np.isfinite(end))),
+        ("interval above the collar", start < 0),
+        ("reversed interval", start > end),
+        ("interval of no length", start == end),
+    ):
+        for i in np.flatnonzero(bad & good):
+            _add(log, table, i, check, WARNING, detail=f"{start[i]:g} to {end[i]:g}")
+        good &= ~bad
+    if not good.any():
+        raise InputError(f"{table.source}: no row is an interval with a length")
+    return good, np.unique(table.hole[good].astype(str)).astype(object)
+
+
+def placed_intervals(table: HoleTable, good: Bools, collars: Collars, log: Log) -> Intervals:
+    """Return the intervals of holes with a collar, cut so that none overlaps another.
+
+    Of two intervals that begin at the same depth the shorter is kept (of equal ones the first
+    row); one that runs into the next ends where that begins; one that runs below the depth
+    that the collar table gives ends there.
+    """
+    hole = collars.find(table.hole)
+    named = dict.fromkeys(table.hole[good & (hole < 0)])
+    for name in named:
+        rows = np.flatnonzero(good & (table.hole == name))
+        log.add(
+            table.source, "assays of a hole without a usable collar", ERROR, "hole left out",
+            hole=str(name), row=int(table.row[rows[0]]), detail=f"{len(rows)} intervals",
+        )  # fmt: skip
+    at = np.flatnonzero(good & (hole >= 0))
+    start, end = table.numbers["from"], table.numbers["to"]
+    at = at[np.lexsort((at, end[at], start[at], hole[at]))]
+    below = start[at] >= collars.depth[hole[at]] * (1 - _ROUNDING)
+    for i in at[below]:
+        text = f"{start[i]:g} to {end[i]:g}, hole {collars.depth[hole[i]]:g}"
+        _add(log, table, i, "interval below the hole's depth", WARNING, detail=text)
+    at = at[~below]
+    if not len(at):
+        return Intervals(at, start[at], end[at], at)
+    same = np.r_[False, (hole[at[1:]] == hole[at[:-1]]) & (start[at[1:]] == start[at[:-1]])]
+    for i, kept in zip(at[same], at[np.flatnonzero(same) - 1], strict=True):
+        text = f"{start[i]:g} to {end[i]:g}, as data row {table.row[kept]}"
+        _add(log, table, i, "interval that begins where another does", WARNING, detail=text)
+    at = at[~same]
+    cut = end[at].copy()
+    following = np.r_[np.where(hole[at[1:]] == hole[at[:-1]], start[at[1:]], np.inf), np.inf]
+    for check, limit, action in (
+        ("overlapping intervals", following, "cut where the next begins"),
+        ("interval below the hole's depth", collars.depth[hole[at]], "cut there"),
+    ):
+        over = cut > limit
+        for k in np.flatnonzero(cut > limit + _ROUNDING * np.abs(cut)):
+            text = f"{start[at[k]]:g} to {end[at[k]]:g}, next at {limit[k]:g}"
+            if limit is not following:
+                text = f"{start[at[k]]:g} to {end[at[k]]:g}, hole {limit[k]:g}"
+            _add(log, table, at[k], check, WARNING, action, text)
+        cut = np.where(over, limit, cut)
+    return Intervals(hole[at], start[at], cut, at)
+
+
+def checked_stations(
+    table: HoleTable, collars: Collars, intervals: Intervals, assayed: set[str], log: Log
+) -> Stations:
+    """Return the stations that can be used, with the collar table's directions where needed.
+
+    A station is left out where a value is missing or no direction, where its depth is negative
+    or far beyond the hole (past 1.05 times the collar table's depth; without one, past 3 times
+    the hole's deepest assay and past every assay of all holes), and where it repeats the depth
+    of another. Two directions at one depth keep the first row.
+    """
+    hole = collars.find(table.hole)
+    depth, azimuth, dip = (table.numbers[n].copy() for n in ("at", "azimuth", "dip"))
+    azimuth[np.isnan(azimuth) & (np.abs(dip) == 90.0)] = 0.0  # a vertical hole has none
+    good = np.ones(len(table), dtype=bool)
+    reach = _reach(hole, collars, intervals)
+    missing = ~(np.isfinite(depth) & np.isfinite(azimuth) & np.isfinite(dip))
+    for check, bad, values, unit in (
+        ("survey of a hole without a usable collar", hole < 0, depth, ""),
+        ("survey without depth, azimuth or dip", missing, depth, ""),
+        ("survey above the collar", depth < 0, depth, ""),
+        ("survey far below the hole", depth > reach, depth, ""),
+        ("dip beyond 90 degrees", (dip > 90) | (dip < -90), dip, " degrees"),
+        ("azimuth beyond 360 degrees", (azimuth > 360) | (azimuth < -360), azimuth, " degrees"),
+    ):
+        for i in np.flatnonzero(bad & good):
+            _add(log, table, i, check, WARNING, detail=f"{values[i]:g}{unit}")
+        good &= ~bad
+    at = np.flatnonzero(good)
+    at = at[np.lexsort((at, depth[at], hole[at]))]
+    twice = np.zeros(len(at), dtype=bool)
+    twice[1:] = (hole[at[1:]] == hole[at[:-1]]) & (depth[at[1:]] == depth[at[:-1]])
+    for i in at[twice]:
+        _add(log, table, i, "two surveys at one depth", WARNING, detail=f"{depth[i]:g}")
+    at = at[~twice]
+    stations = Stations(hole[at], depth[at], azimuth[at], dip[at], table.row[at])
+    return _with_collar_directions(stations, collars, assayed, log)
+
+
+def _reach(hole: Ints, collars: Collars, intervals: Intervals) -> Floats:
+    """Return for each survey row the depth beyond which it cannot be of its hole."""
+    if not len(intervals.hole):
+        return np.full(len(hole), np.inf)
+    deepest = np.zeros(len(collars))
+    np.maximum.at(deepest, intervals.hole, intervals.end)
+    everywhere = deepest.max()
+    own = np.where(deepest > 0, np.maximum(_FAR * deepest, everywhere), _FAR * everywhere)
+    limit = np.where(np.isfinite(collars.depth), _SLACK * collars.depth, own)
+    return np.where(hole >= 0, limit[hole], np.inf)
+
+
+def _with_collar_directions(
+    stations: Stations, collars: Collars, assayed: set[str], log: Log
+) -> Stations:
+    """Return the stations, holes without any taking the collar table's direction.
+
+    Holes that have neither are findings: they cannot be placed.
+    """
+    bare = np.setdiff1d(np.arange(len(collars)), stations.hole)
+    azimuth = np.where(np.abs(collars.dip) == 90.0, 0.0, collars.azimuth)
+    known = np.isfinite(azimuth) & (np.abs(collars.dip) <= 90.0)
+    for k in bare:
+        given = bool(known[k])
+        log.add(
+            collars.source,
+            "unsurveyed hole",
+            WARNING if given else _grave(collars.names[k], assayed),
+            "the collar table's direction taken all along" if given else "hole left out",
+            hole=str(collars.names[k]),
+            row=int(collars.row[k]),
+        )
+    taken = bare[known[bare]]
+    hole = np.r_[stations.hole, taken]
+    depth = np.r_[stations.depth, np.zeros(len(taken))]
+    order = np.lexsort((depth, hole))
+    return Stations(
+        hole[order],
+        depth[order],
+        np.r_[stations.azimuth, azimuth[taken]][order],
+        np.r_[stations.dip, collars.dip[taken]][order],
+        np.r_[stations.row, np.zeros(len(taken), dtype=np.int64)][order],
+    )
+
+
+def dip_positive_down(dip: Floats, stated: bool | None, source: str, log: Log) -> bool:
+    """Return whether positive dips point down, as stated or as all dips show.
+
+    Holes are drilled downwards as a rule, so dips of one sign show the convention. Dips of both
+    signs show nothing.
+
+    Parameters
+    ----------
+    dip : (s,) float
+        Degrees, as in the tables.
+    stated : bool, optional
+        What the user says.
+    source : str
+        The survey table.
+    log : Log
+        Takes the findings.
+
+    Raises
+    ------
+    InputError
+        Dips of both signs, and nothing stated.
+    """
+    up, down = int(np.count_nonzero(dip < 0)), int(np.count_nonzero(dip > 0))
+    spread = f"{dip.min():g} to {dip.max():g} degrees" if len(dip) else "none"
+    if stated is not None:
+        if (down if not stated else up) and not (up if not stated else down):
+            log.add(
+                source, "every hole goes up by the dip convention stated", WARNING,
+                "kept as stated", detail=spread,
+            )  # fmt: skip
+        return stated
+    if up and down:
+        raise InputError(
+            f"{source}: dips have both signs ({down} positive, {up} negative), which does not show "
+            "which way is down: state --dip-positive-down or --no-dip-positive-down"
+        )
+    positive = not up
+    log.add(
+        source,
+        f"no dip is {'negative' if positive else 'positive'}, as where positive dips point "
+        f"{'down' if positive else 'up'}",
+        NOTE,
+        f"taken so; state it by --{'' if positive else 'no-'}dip-positive-down",
+        detail=spread,
+    )
+    return positive
+
+
+def checked_turns(stations: Stations, collars: Collars, source: str, log: Log) -> Stations:
+    """Return the stations without those that turn a hole back on itself; sharp turns are named.
+
+    Dips are positive down here.
+    """
+    while True:
+        t = directions(stations.azimuth, stations.dip)
+        turn = np.zeros(len(t))
+        same = stations.hole[1:] == stations.hole[:-1]
+        turn[1:] = np.where(same, np.degrees(dogleg(t[:-1], t[1:])), 0.0)
+        back = turn > _REVERSED
+        back[1:] &= ~back[:-1]  # one at a time: the next is measured anew
+        check, action = "direction turned back on itself", LEFT_OUT
+        chosen = back if back.any() else turn > _SHARP
+        if not back.any():
+            check, action = "hole turned by more than a right angle", "kept as it stands"
+        for i in np.flatnonzero(chosen):
+            log.add(
+                source, check, WARNING, action, hole=str(collars.names[stations.hole[i]]),
+                row=int(stations.row[i]), detail=f"{turn[i]:.0f} degrees",
+            )  # fmt: skip
+        if not back.any():
+            return stations
+        stations = stations.kept(~back)
+
+
+def extrapolated(stations: Stations, ends: Floats, collars: Collars, source: str, log: Log) -> None:
+    """Name the holes that run straight on above their first station or below their last."""
+    count = np.bincount(stations.hole, minlength=len(collars))
+    last = np.cumsum(count) - 1
+    for k in np.flatnonzero(count):
+        top, bottom = stations.depth[last[k] - count[k] + 1], stations.depth[last[k]]
+        name, row = str(collars.names[k]), int(stations.row[last[k]])
+        if ends[k] > bottom * (1 + _ROUNDING):
+            log.add(
+                source, "hole runs below its last survey", NOTE, "straight on and marked",
+                hole=name, row=row, detail=f"{bottom:g} to {ends[k]:g}",
+            )  # fmt: skip
+        if top > 0:
+            row = int(stations.row[last[k] - count[k] + 1])
+            log.add(
+                source, "no survey at the collar", NOTE, "straight from there, and marked",
+                hole=name, row=row, detail=f"first at {top:g}",
+            )  # fmt: skip
+
+
+def without_holes(collars: Collars, keep: Bools) -> Collars:
+    """Return some of the collars."""
+    return replace(
+        collars,
+        names=collars.names[keep],
+        points=collars.points[keep],
+        depth=collars.depth[keep],
+        azimuth=collars.azimuth[keep],
+        dip=collars.dip[keep],
+        row=collars.row[keep],
+    )
+
+
+def _grave(hole: object, assayed: set[str]) -> Severity:
+    """Return how bad it is that a hole cannot be placed."""
+    return ERROR if str(hole) in assayed else WARNING
+
+
+def _add(
+    log: Log,
+    table: HoleTable,
+    i: int | np.integer,
+    check: str,
+    severity: Severity,
+    action: str = LEFT_OUT,
+    detail: str = "",
+) -> None:
+    """Add a finding about a row of a table."""
+    log.add(
+        table.source, check, severity, action, hole=str(table.hole[i]), row=int(table.row[i]),
+        detail=detail,
+    )  # fmt: skip

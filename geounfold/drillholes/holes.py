@@ -1,0 +1,400 @@
+"""Drill-holes read, checked and desurveyed; their samples and traces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.drillholes import checks
+from geounfold.drillholes.checks import Collars, Intervals, Stations
+from geounfold.drillholes.composite import CompositeOptions, Residual, composite
+from geounfold.drillholes.desurvey import Paths, desurvey, directions
+from geounfold.drillholes.findings import ERROR, NOTE, Finding, Log, facts, messages, refusal
+from geounfold.drillholes.tables import (
+    HoleTable,
+    check_fields,
+    grade_columns,
+    read_hole_table,
+)
+from geounfold.errors import InputError, OptionError
+from geounfold.mesh import Bools, Floats
+
+SURVEYED, EXTRAPOLATED = "surveyed", "extrapolated"
+SAMPLE_COLUMNS = ("hole", "from", "to", "x", "y", "z", "position", "coverage")
+
+_MOST_TRACE_POINTS = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class DrillHoles:
+    """Drill-holes whose rows were checked and whose paths are known.
+
+    Attributes
+    ----------
+    sources : dict of str
+        The tables by kind: collar, survey, assay.
+    collars : Collars
+        The holes that could be placed.
+    stations : Stations
+        Their surveys; dips positive down.
+    intervals : Intervals
+        Their assayed intervals.
+    paths : Paths
+        Where they run.
+    ends : (h,) float
+        Depth to which each is drawn: of its last interval, its last survey, or the depth that
+        the collar table gives, whichever is deepest.
+    grades : dict of (n,) float
+        Numbers of the intervals, by column; NaN where not assayed.
+    words : dict of (n,) object
+        Other columns of the intervals.
+    positive_down : bool
+        The dip convention of the tables.
+    stated : bool
+        Whether it was stated, else detected.
+    rows : dict of int
+        Rows of the tables as read.
+    findings : tuple of Finding
+        What was found and done.
+    """
+
+    sources: Mapping[str, str]
+    collars: Collars
+    stations: Stations
+    intervals: Intervals
+    paths: Paths
+    ends: Floats
+    grades: Mapping[str, Floats]
+    words: Mapping[str, np.ndarray]
+    positive_down: bool
+    stated: bool
+    rows: Mapping[str, int]
+    findings: tuple[Finding, ...]
+
+    def __len__(self) -> int:
+        return len(self.collars)
+
+    def __repr__(self) -> str:
+        return (
+            f"DrillHoles({len(self)} holes, {len(self.stations.depth)} stations, "
+            f"{len(self.intervals.start)} intervals, {len(self.findings)} findings)"
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the holes, in the collar table's order."""
+        return [str(name) for name in self.collars.names]
+
+    def at(self, hole: str, depth: Floats) -> Floats:
+        """Return positions (n, 3) at depths along one hole.
+
+        Raises
+        ------
+        InputError
+            No such hole.
+        """
+        where = self.collars.find(np.array([hole], dtype=object))[0]
+        if where < 0:
+            raise InputError(f"no hole '{hole}' could be placed")
+        depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
+        return self.paths.at(np.full(len(depths), where), depths)[0]
+
+    def samples(
+        self,
+        length: float | None = None,
+        *,
+        residual: Residual = "merge",
+        min_coverage: float = 0.5,
+    ) -> pd.DataFrame:
+        """Return the intervals, or composites of a length, with where their midpoints lie.
+
+        Parameters
+        ----------
+        length : float, optional
+            Composite to this length along the hole (see `CompositeOptions`, also for the rules
+            that follow); without, the intervals as they are.
+        residual : {"merge", "drop", "keep"}, optional
+            What becomes of a short last composite.
+        min_coverage : float, optional
+            Share of a composite that must be assayed for a grade.
+
+        Returns
+        -------
+        DataFrame
+            Columns hole, from, to, x, y, z (of the midpoint along the hole, in the collars'
+            coordinates), position (surveyed, or extrapolated beyond a hole's surveys), for
+            composites coverage (share of the length that intervals cover), and the assay
+            table's other columns. A column called as one of these is prefixed by ``assay_``.
+            Sorted by hole, in the collar table's order, and depth.
+
+        Raises
+        ------
+        OptionError
+            A length or rule outside its valid values.
+        InputError
+            Nothing is assayed over enough of any composite.
+        """
+        iv = self.intervals
+        extra: dict[str, Any] = {}
+        if length is None:
+            hole, start, end = iv.hole, iv.start, iv.end
+            own: dict[str, Any] = {**self.grades, **self.words}
+        else:
+            options = CompositeOptions(length=length, residual=residual, min_coverage=min_coverage)
+            made = composite(
+                iv.hole, iv.start, iv.end, _stacked(self.grades, len(iv.hole), np.float64),
+                _stacked(self.words, len(iv.hole), object), options,
+            )  # fmt: skip
+            hole, start, end = made.hole, made.start, made.end
+            if not len(hole):
+                raise InputError(
+                    f"{self.sources['assay']}: no composite of {length:g} is assayed over "
+                    f"{min_coverage:.0%} of its length; take a shorter length or a lower share"
+                )
+            extra["coverage"] = np.minimum(made.covered / (end - start), 1.0)
+            own = {name: made.grades[:, j] for j, name in enumerate(self.grades)}
+            own |= {name: made.words[:, j] for j, name in enumerate(self.words)}
+        points, enclosed = self.paths.at(hole, 0.5 * (start + end))
+        columns = {
+            "hole": self.collars.names[hole],
+            "from": start,
+            "to": end,
+            "x": points[:, 0],
+            "y": points[:, 1],
+            "z": points[:, 2],
+            "position": _position(enclosed),
+            **extra,
+        }
+        for name in (*self.grades, *self.words):
+            columns[f"assay_{name}" if name.lower() in SAMPLE_COLUMNS else name] = own[name]
+        return pd.DataFrame(columns)
+
+    def traces(self, step: float | None = None) -> pd.DataFrame:
+        """Return points along every hole, from the collar to its end.
+
+        Parameters
+        ----------
+        step : float, optional
+            Length between points, which lie at whole multiples of it, at every station and at
+            the end; the intervals' median length without.
+
+        Returns
+        -------
+        DataFrame
+            Columns hole, depth, x, y, z and position (as `samples`), sorted by hole and depth.
+
+        Raises
+        ------
+        OptionError
+            A step that is not above 0, or more than 20 million points.
+        """
+        if step is None:
+            step = float(np.median(self.intervals.end - self.intervals.start))
+        if not (np.isfinite(step) and step > 0):
+            raise OptionError(f"the step along traces must be above 0, not {step}")
+        share = np.floor(self.ends / step)
+        if share.sum() > _MOST_TRACE_POINTS:
+            raise OptionError(
+                f"a step of {step:g} makes {share.sum():.3g} trace points; enlarge it"
+            )
+        count = share.astype(np.int64) + 1
+        owner = np.repeat(np.arange(len(self)), count)
+        number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+        hole = np.r_[owner, self.stations.hole, np.arange(len(self))]
+        depth = np.r_[number * step, self.stations.depth, self.ends]
+        order = np.lexsort((depth, hole))
+        hole, depth = hole[order], depth[order]
+        new = np.r_[True, (hole[1:] != hole[:-1]) | (np.diff(depth) > 1e-9 * step)]
+        hole, depth = hole[new], depth[new]
+        points, enclosed = self.paths.at(hole, depth)
+        return pd.DataFrame(
+            {
+                "hole": self.collars.names[hole],
+                "depth": depth,
+                "x": points[:, 0],
+                "y": points[:, 1],
+                "z": points[:, 2],
+                "position": _position(enclosed),
+            }
+        )
+
+    def messages(self) -> list[str]:
+        """Return one line for each kind of finding."""
+        return messages(self.findings)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what was read and found, for a summary."""
+        return {
+            "files": dict(self.sources),
+            "rows": dict(self.rows),
+            "holes": len(self),
+            "stations": len(self.stations.depth),
+            "intervals": len(self.intervals.start),
+            "dip_positive_down": self.positive_down,
+            "dip_convention": "stated" if self.stated else "detected",
+            "grades": list(self.grades),
+            **facts(self.findings),
+        }
+
+
+def read_drillholes(
+    collar: str | Path | pd.DataFrame,
+    survey: str | Path | pd.DataFrame,
+    assay: str | Path | pd.DataFrame,
+    *,
+    columns: Mapping[str, str] | None = None,
+    grades: Sequence[str] | None = None,
+    dip_positive_down: bool | None = None,
+    strict: bool = False,
+    drop_invalid: bool = False,
+) -> DrillHoles:
+    """Return drill-holes from their three tables, checked and desurveyed.
+
+    Parameters
+    ----------
+    collar, survey, assay : path or DataFrame
+        Where holes begin (hole, x, y, z; depth, azimuth and dip where there are), which way they
+        run (hole, at, azimuth, dip; degrees), what was measured (hole, from, to and any others).
+        All lengths in one unit; azimuths clockwise from y. Columns are found by name in any
+        letter case (`ALIASES`).
+    columns : dict of str, optional
+        Names of columns by field (hole, x, y, z, depth, at, azimuth, dip, from, to) where they
+        are not found.
+    grades : names, optional
+        The assay table's columns to be averaged as numbers; all columns of numbers without.
+    dip_positive_down : bool, optional
+        Whether dips point down where positive. Without, taken from their sign, as holes go down
+        as a rule, and reported.
+    strict : bool, optional
+        Refuse where any row is left out, cut or taken otherwise than it stands.
+    drop_invalid : bool, optional
+        Go on without the holes that have assays but cannot be placed: no collar, two collars,
+        no survey.
+
+    Raises
+    ------
+    InputError
+        A table that cannot be read, columns missing or ambiguous, nothing left, dips of both
+        signs without a convention stated, a hole that cannot be placed (without `drop_invalid`),
+        any finding but notes (with `strict`).
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> collar = pd.DataFrame({"BHID": ["A"], "X": [0.0], "Y": [0.0], "Z": [100.0]})
+    >>> survey = pd.DataFrame({"BHID": ["A"], "AT": [0.0], "AZ": [90.0], "DIP": [30.0]})
+    >>> assay = pd.DataFrame({"BHID": ["A"], "FROM": [10.0], "TO": [30.0], "CU": [1.5]})
+    >>> holes = read_drillholes(collar, survey, assay, dip_positive_down=True)
+    >>> holes.samples()[["hole", "x", "z", "CU"]].round(3).to_numpy().tolist()
+    [['A', 17.321, 90.0, 1.5]]
+    """
+    log = Log()
+    names = dict(columns or {})
+    check_fields(names)
+    tables = {
+        kind: read_hole_table(kind, given, names, log)
+        for kind, given in (("collar", collar), ("survey", survey), ("assay", assay))
+    }
+    good, with_assays = checks.checked_intervals(tables["assay"], log)
+    assayed = {str(name) for name in with_assays}
+    collars = checks.checked_collars(tables["collar"], assayed, log)
+    intervals = checks.placed_intervals(tables["assay"], good, collars, log)
+    source = tables["survey"].source
+    stations = checks.checked_stations(tables["survey"], collars, intervals, assayed, log)
+    _check_left(stations, intervals, tables, log)
+    down = checks.dip_positive_down(stations.dip, dip_positive_down, source, log)
+    stations = _turned(stations, down)
+    stations = checks.checked_turns(stations, collars, source, log)
+    collars, stations, intervals = _placed(collars, stations, intervals)
+    ends = _ends(collars, stations, intervals)
+    checks.extrapolated(stations, ends, collars, source, log)
+    grade, words = grade_columns(tables["assay"], None if grades is None else tuple(grades), log)
+    _refuse(log.found, strict=strict, drop_invalid=drop_invalid)
+    paths = desurvey(
+        collars.points, stations.hole, stations.depth, directions(stations.azimuth, stations.dip)
+    )
+    return DrillHoles(
+        sources={kind: table.source for kind, table in tables.items()},
+        collars=collars,
+        stations=stations,
+        intervals=intervals,
+        paths=paths,
+        ends=ends,
+        grades={name: values[intervals.position] for name, values in grade.items()},
+        words={name: values[intervals.position] for name, values in words.items()},
+        positive_down=down,
+        stated=dip_positive_down is not None,
+        rows={kind: int(table.row[-1]) for kind, table in tables.items()},
+        findings=tuple(log.found),
+    )
+
+
+def _check_left(
+    stations: Stations, intervals: Intervals, tables: Mapping[str, HoleTable], log: Log
+) -> None:
+    """Raise where no hole has both a survey and an interval."""
+    if not np.intersect1d(stations.hole, intervals.hole).size:
+        why = (
+            refusal([f for f in log.found if f.severity != NOTE] or log.found, "correct the tables")
+            if log.found
+            else "the three tables name different holes"
+        )
+        raise InputError(
+            f"no hole of {tables['collar'].source} has both a survey and assays that can be "
+            f"used: {why}"
+        )
+
+
+def _turned(stations: Stations, down: bool) -> Stations:
+    """Return stations with dips positive down."""
+    dip = stations.dip if down else -stations.dip
+    return Stations(stations.hole, stations.depth, stations.azimuth, dip, stations.row)
+
+
+def _placed(
+    collars: Collars, stations: Stations, intervals: Intervals
+) -> tuple[Collars, Stations, Intervals]:
+    """Return only holes that have a direction, numbered anew."""
+    keep = np.zeros(len(collars), dtype=bool)
+    keep[stations.hole] = True
+    number = np.cumsum(keep) - 1
+    stations = Stations(
+        number[stations.hole], stations.depth, stations.azimuth, stations.dip, stations.row
+    )
+    kept = intervals.kept(keep[intervals.hole])
+    intervals = Intervals(number[kept.hole], kept.start, kept.end, kept.position)
+    return checks.without_holes(collars, keep), stations, intervals
+
+
+def _ends(collars: Collars, stations: Stations, intervals: Intervals) -> Floats:
+    """Return how deep each hole is known to go."""
+    ends = np.where(np.isfinite(collars.depth), collars.depth, 0.0)
+    np.maximum.at(ends, stations.hole, stations.depth)
+    np.maximum.at(ends, intervals.hole, intervals.end)
+    return ends
+
+
+def _refuse(findings: Sequence[Finding], *, strict: bool, drop_invalid: bool) -> None:
+    """Raise on holes that cannot be placed, and with `strict` on anything but notes."""
+    grave = [f for f in findings if f.severity == ERROR]
+    if grave and not drop_invalid:
+        raise InputError(
+            refusal(grave, "correct it, or go on without such holes by --drop-invalid")
+        )
+    other = [f for f in findings if f.severity != NOTE]
+    if other and strict:
+        raise InputError(refusal(other, "correct it, or go on without --strict"))
+
+
+def _stacked(columns: Mapping[str, np.ndarray], rows: int, kind: Any) -> np.ndarray:
+    """Return columns side by side, (rows, c)."""
+    return np.column_stack(list(columns.values())) if columns else np.empty((rows, 0), dtype=kind)
+
+
+def _position(enclosed: Bools) -> np.ndarray:
+    return np.where(enclosed, SURVEYED, EXTRAPOLATED)

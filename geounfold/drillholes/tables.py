@@ -1,0 +1,258 @@
+"""The three tables of drill-holes: their columns found by name, their values as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from geounfold.drillholes.findings import WARNING, Log
+from geounfold.errors import InputError, OptionError
+from geounfold.io._text import listing, shown
+from geounfold.io.coordinates import LARGEST_COORDINATE, plain_name, readable_numbers
+from geounfold.io.tables import Table, objects, read_table
+from geounfold.mesh import Bools, Floats, Ints
+
+HOLE = "hole"
+_HOLE = (
+    "bhid", "holeid", "hole", "dhid", "ddhid", "dhhole", "drillhole", "drillholeid", "boreholeid",
+    "borehole", "holeno", "holenumber", "holename", "wellid", "well",
+)  # fmt: skip
+_AZIMUTH = ("az", "azi", "azim", "azimuth", "bearing", "brg", "azgrid", "azimuthgrid")
+_DIP = ("dip", "dipangle", "plunge")
+
+# Spelled without case, spaces, underscores and units, as for coordinates. Inclination is no
+# dip: it is counted from the vertical in one trade and from the horizontal in the other.
+ALIASES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "collar": {
+        HOLE: _HOLE,
+        "x": ("xcollar", "collarx", "x", "xc", "xcoord", "easting", "east", "utme", "collareast"),
+        "y": ("ycollar", "collary", "y", "yc", "ycoord", "northing", "north", "utmn",
+              "collarnorth"),
+        "z": ("zcollar", "collarz", "z", "zc", "zcoord", "elevation", "elev", "rl", "collarrl",
+              "collarelevation"),
+        "depth": ("depth", "maxdepth", "eoh", "eohdepth", "enddepth", "totaldepth", "holedepth",
+                  "finaldepth", "holelength", "length"),
+        "azimuth": _AZIMUTH,
+        "dip": _DIP,
+    },
+    "survey": {
+        HOLE: _HOLE,
+        "at": ("at", "depth", "surveydepth", "depthat", "distance", "md", "measureddepth"),
+        "azimuth": _AZIMUTH,
+        "dip": _DIP,
+    },
+    "assay": {
+        HOLE: _HOLE,
+        "from": ("from", "depthfrom", "fromdepth", "mfrom", "sampfrom", "start"),
+        "to": ("to", "depthto", "todepth", "mto", "sampto", "end"),
+    },
+}  # fmt: skip
+"""Names of columns by table and field."""
+
+_OPTIONAL = {"collar": {"depth", "azimuth", "dip"}, "survey": set[str](), "assay": set[str]()}
+
+
+@dataclass(frozen=True, eq=False)
+class HoleTable:
+    """One of the three tables, its columns found.
+
+    Attributes
+    ----------
+    source : str
+        The file, as it was named; else collar, survey or assay.
+    hole : (n,) object
+        Names of holes as text without blanks around; empty where missing.
+    numbers : dict of (n,) float
+        By field; NaN where missing or no number.
+    rest : DataFrame, n rows
+        All other columns as they are.
+    row : (n,) int
+        Data rows in the file, 1 for the first.
+    """
+
+    source: str
+    hole: np.ndarray
+    numbers: Mapping[str, Floats]
+    rest: pd.DataFrame
+    row: Ints
+
+    def __len__(self) -> int:
+        return len(self.hole)
+
+    def kept(self, keep: Bools) -> HoleTable:
+        """Return the table with some of its rows."""
+        if keep.all():
+            return self
+        return HoleTable(
+            self.source,
+            self.hole[keep],
+            {name: v[keep] for name, v in self.numbers.items()},
+            self.rest.loc[keep].reset_index(drop=True),
+            self.row[keep],
+        )
+
+
+def read_hole_table(
+    kind: str, given: str | Path | pd.DataFrame, columns: Mapping[str, str], log: Log
+) -> HoleTable:
+    """Return one of the three tables; rows without a hole's name are left out.
+
+    Parameters
+    ----------
+    kind : {"collar", "survey", "assay"}
+        Which one.
+    given : path or DataFrame
+        A table that io reads, or one at hand.
+    columns : dict of str
+        Names of columns by field, where they are not found by `ALIASES`; fields of other tables
+        are passed over.
+    log : Log
+        Takes the findings.
+
+    Raises
+    ------
+    InputError
+        No such file, a column that is missing or ambiguous, or no row with a hole's name.
+    """
+    if isinstance(given, pd.DataFrame):
+        source, table = f"the {kind} table", Table(given.reset_index(drop=True), text=False)
+        if not len(given):
+            raise InputError(f"{source}: has no rows")
+    else:
+        source, table = str(given), read_table(given)
+    names = [str(name) for name in table.frame.columns]
+    where = _fields(kind, names, columns, source)
+    hole = _hole_names(table.frame.iloc[:, where[HOLE]])
+    row = np.arange(1, len(hole) + 1)
+    values: dict[str, Floats] = {}
+    for field, position in where.items():
+        if field == HOLE:
+            continue
+        column = table.frame.iloc[:, position]
+        read, wrong = readable_numbers(column)
+        wrong = wrong | (np.abs(read) > LARGEST_COORDINATE)
+        values[field] = np.where(wrong, np.nan, read)
+        for i in np.flatnonzero(wrong):
+            log.add(
+                source, f"{field} is no number, or too large", WARNING, "taken as missing",
+                hole=str(hole[i]), row=int(row[i]), detail=f"'{shown(column.iloc[i])}'",
+            )  # fmt: skip
+    rest = table.frame.iloc[:, [i for i in range(len(names)) if i not in where.values()]]
+    rest = rest.set_axis(pd.Index([str(n) for n in rest.columns], dtype=object), axis=1)
+    whole = HoleTable(source, hole, values, rest, row)
+    named = hole != ""
+    for i in np.flatnonzero(~named):
+        log.add(source, "no hole named", WARNING, "left out", row=int(row[i]))
+    if not named.any():
+        raise InputError(f"{source}: no row names a hole in column '{names[where[HOLE]]}'")
+    return whole.kept(named)
+
+
+def _fields(kind: str, names: list[str], columns: Mapping[str, str], source: str) -> dict[str, int]:
+    """Return where each field's column is."""
+    plain = [plain_name(name) for name in names]
+    where: dict[str, int] = {}
+    for field, aliases in ALIASES[kind].items():
+        if field in columns and columns[field] in names:
+            found = [i for i, name in enumerate(names) if name == columns[field]]
+        else:
+            found = [i for i, name in enumerate(plain) if name in aliases]
+        if len(found) > 1:
+            raise InputError(
+                f"{source}: several columns may be the {kind} table's {field}: "
+                f"{listing(names[i] for i in found)}; choose by --holes-columns "
+                f"{field}={names[found[0]]}"
+            )
+        if found:
+            where[field] = found[0]
+        elif field not in _OPTIONAL[kind]:
+            raise InputError(
+                f"{source}: the {kind} table needs a column for {field} (such as "
+                f"{listing(aliases[:4])}); the file has: {listing(names)}; name it by "
+                f"--holes-columns {field}=NAME"
+            )
+    if len(set(where.values())) < len(where):
+        raise InputError(f"{source}: one column was named for two fields")
+    return where
+
+
+def check_fields(columns: Mapping[str, str]) -> None:
+    """Raise OptionError where a field is named that none of the tables has."""
+    known = sorted({field for fields in ALIASES.values() for field in fields})
+    for field in columns:
+        if field not in known:
+            raise OptionError(
+                f"drill-hole tables have no field '{shown(field)}'; fields: {listing(known)}"
+            )
+
+
+def _hole_names(column: pd.Series) -> np.ndarray:
+    """Return names as text: 34873.0, as a spreadsheet's blanks make it, is 34873."""
+    values = objects(column)
+    whole = [
+        int(v) if isinstance(v, float) and np.isfinite(v) and v == int(v) else v for v in values
+    ]
+    return np.array([str(v).strip() for v in whole], dtype=object)
+
+
+def grade_columns(
+    table: HoleTable, chosen: tuple[str, ...] | None, log: Log
+) -> tuple[dict[str, Floats], dict[str, np.ndarray]]:
+    """Return the assay table's other columns: numbers to be averaged, and text to be carried.
+
+    A column is one of numbers where at least half of the values that are there are numbers;
+    the others are findings and taken as missing, never as zero.
+
+    Parameters
+    ----------
+    table : HoleTable
+        Assays.
+    chosen : names, optional
+        The columns to take as numbers; without, all that are.
+    log : Log
+        Takes the findings.
+
+    Raises
+    ------
+    OptionError
+        A chosen column is not there.
+    """
+    names = [str(name) for name in table.rest.columns]
+    for name in chosen or ():
+        if names.count(name) != 1:
+            raise OptionError(
+                f"{table.source}: no column '{shown(name)}' for grades; it has: {listing(names)}"
+            )
+    grades: dict[str, Floats] = {}
+    words: dict[str, np.ndarray] = {}
+    for i, name in enumerate(names):
+        column = table.rest.iloc[:, i]
+        values, wrong = readable_numbers(column)
+        wrong = wrong | np.isinf(values)
+        mostly = 2 * np.count_nonzero(wrong) <= np.count_nonzero(wrong | ~np.isnan(values))
+        if name in chosen if chosen is not None else mostly:
+            grades[name] = np.where(wrong, np.nan, values)
+            _log_grades(table, column, values, wrong, log)
+        else:
+            words[name] = np.array([str(v) for v in objects(column)], dtype=object)
+    return grades, words
+
+
+def _log_grades(
+    table: HoleTable, column: pd.Series, values: Floats, wrong: Bools, log: Log
+) -> None:
+    for i in np.flatnonzero(wrong):
+        log.add(
+            table.source, f"{column.name} is no number", WARNING, "taken as not assayed",
+            hole=str(table.hole[i]), row=int(table.row[i]), detail=f"'{shown(column.iloc[i])}'",
+        )  # fmt: skip
+    for i in np.flatnonzero(values < 0):
+        log.add(
+            table.source, f"{column.name} is negative, perhaps a code", WARNING,
+            "kept as it stands", hole=str(table.hole[i]), row=int(table.row[i]),
+            detail=f"{values[i]:g}",
+        )  # fmt: skip

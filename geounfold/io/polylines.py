@@ -1,0 +1,47 @@
+"""Lines in space, as VTK poly data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from geounfold.mesh import Floats, Ints
+
+
+def write_polylines(
+    path: str | Path,
+    points: Floats,
+    first: Ints,
+    point_data: Mapping[str, np.ndarray],
+    line_data: Mapping[str, Sequence[str]],
+) -> None:
+    """Write lines to a ``.vtp`` file, floats bit for bit.
+
+    Parameters
+    ----------
+    path : path
+        Ends in .vtp.
+    points : (n, 3) float
+        Vertices, line after line.
+    first : (k + 1,) int
+        Line k has the vertices ``first[k]`` to ``first[k + 1] - 1``.
+    point_data : dict of (n,) or (n, 3) arrays
+        Values at the vertices.
+    line_data : dict of k texts
+        Words for each line.
+    """
+    import pyvista
+
+    size = np.diff(first)
+    cells = np.empty(len(points) + len(size), dtype=np.int64)
+    heads = first[:-1] + np.arange(len(size))
+    cells[heads] = size
+    cells[np.delete(np.arange(len(cells)), heads)] = np.arange(len(points))
+    mesh = pyvista.PolyData(np.asarray(points, dtype=np.float64), lines=cells)
+    for name, values in point_data.items():
+        mesh.point_data[name] = values
+    for name, words in line_data.items():
+        mesh.cell_data[name] = list(words)
+    mesh.save(path, binary=True)

@@ -378,7 +378,7 @@ def test_no_map_file(points: Path, fails: Callable[..., str]) -> None:
         ("t.ply", "hello", ("t.ply", "not a surface")),
         ("t.obj", "", ("empty",)),
         ("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", ("no triangles",)),
-        ("t.dxf", "0\nSECTION\n", (".dxf", ".ply")),
+        ("t.dwg", "0\nSECTION\n", (".dwg", ".ply")),
         ("t.csv", "x,y,z,v1,v2,v3\n0,0,0,1,2,4\n1,0,0,,,\n0,1,0,,,\n", ("triangle 1", "1 to 3")),
         ("t.csv", "x,y,z,v1,v2,v3\n0,0,0,1,2,2.5\n1,0,0,,,\n0,1,0,,,\n", ("triangle 1",)),
         ("t.csv", "x,y,z,v1,v2\n0,0,0,1,2\n1,0,0,,\n", ("v1, v2, v3",)),

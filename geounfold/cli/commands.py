@@ -12,9 +12,18 @@ import numpy as np
 from geounfold.cli.console import Console
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.errors import InputError, OptionError
-from geounfold.io import Outputs, PointTable, read_points, read_surface, write_json
+from geounfold.io import (
+    Outputs,
+    PointTable,
+    holds_surface,
+    read_points,
+    read_surface,
+    write_json,
+    write_surface,
+)
 from geounfold.io.coordinates import Triple, parse_columns
-from geounfold.io.surfaces import MESH_ENDINGS
+from geounfold.io.formats import point_endings, surface_endings
+from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
@@ -22,6 +31,8 @@ if TYPE_CHECKING:
     from geounfold.mesh import Floats, TriMesh
     from geounfold.options import UnfoldOptions
 
+_POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
+_SURFACES_OUT = surface_endings(writing=True)
 _JSON = (".json",)
 _MAP = (".npz",)
 _VTU = (".vtu",)
@@ -40,12 +51,12 @@ def unfold(args: Namespace, console: Console) -> None:
     check_hole_options(args)
     outputs = Outputs.planned(
         {
-            "--output": (args.output, TABLE_ENDINGS),
+            "--output": (args.output, _POINTS_OUT),
             "--summary": (args.summary, _JSON),
             "--map": (args.map, _MAP),
             "--mesh": (args.mesh, _VTU),
             "--report": (args.report, _HTML),
-            "--samples-out": (args.samples_out, TABLE_ENDINGS),
+            "--samples-out": (args.samples_out, _POINTS_OUT),
             "--traces-out": (args.traces_out, TRACE_ENDINGS),
         },
         _given(args.points, args.samples, args.top, args.bottom, *(args.holes or ())),
@@ -55,6 +66,7 @@ def unfold(args: Namespace, console: Console) -> None:
     if args.report is not None:
         _check_pictures(console)
     table = _read(args.points, args, console)
+    table.check_writable(args.output)
     samples = _read_samples(args, console)
     holes = read_holes(args, console)
     surfaces = {
@@ -115,8 +127,8 @@ def carry(args: Namespace, console: Console) -> None:
         raise OptionError("--holes are where they were drilled: without --inverse")
     outputs = Outputs.planned(
         {
-            "--output": (args.output, TABLE_ENDINGS),
-            "--samples-out": (args.samples_out, TABLE_ENDINGS),
+            "--output": (args.output, (*_POINTS_OUT, *_SURFACES_OUT)),
+            "--samples-out": (args.samples_out, _POINTS_OUT),
             "--traces-out": (args.traces_out, TRACE_ENDINGS),
         },
         _given(args.map, args.points, *(args.holes or ())),
@@ -124,6 +136,9 @@ def carry(args: Namespace, console: Console) -> None:
         watcher=console.journal,
     )
     existing_file(Path(args.map))
+    if args.points is not None and _is_wireframe(args):
+        _carry_surface(args, console, outputs)
+        return
     prefer = (_UNFOLDED,) if args.inverse else ()
     table = None if args.points is None else _read(args.points, args, console, prefer=prefer)
     holes = read_holes(args, console)
@@ -150,6 +165,35 @@ def carry(args: Namespace, console: Console) -> None:
     carried = {args.output: columns, args.samples_out: traced.get("samples", {})}
     counts = [f"{len(c['location'])} points carried into {p}" for p, c in carried.items() if c]
     console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
+
+
+def _is_wireframe(args: Namespace) -> bool:
+    """Return whether `map` is to write a surface: as the output's ending, and both files, say."""
+    kind = ending(Path(args.output))
+    if kind not in _SURFACES_OUT:
+        return False
+    return kind not in _POINTS_OUT or holds_surface(args.points)
+
+
+def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
+    """Carry a wireframe's vertices and write the same triangles between them."""
+    console.stage(f"reading {args.points}")
+    mesh, meta = read_surface_with_meta(args.points)
+    from geounfold import mapping
+
+    saved = mapping.load(args.map)
+    console.stage("carrying vertices")
+    carried = saved.carry(mesh.V, inverse=args.inverse)
+    lost = int(np.count_nonzero(~np.isfinite(carried.points).all(axis=1)))
+    if lost:
+        raise InputError(
+            f"{args.points}: {lost} of {len(mesh.V)} vertices lie too far from the control mesh to "
+            "be carried; cut the wireframe nearer to the body, or write a table of its vertices"
+        )
+    with outputs.writing() as parts:
+        write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
+    _warn_of_outside(args.points, _columns(_UNFOLDED, carried), console)
+    console.done(f"{len(mesh.V)} vertices carried into {args.output}")
 
 
 def _flat(saved: UnfoldingMap) -> Callable[[Floats], dict[str, Any]]:
@@ -186,7 +230,7 @@ def compare(args: Namespace, console: Console) -> None:
     names = [name.strip() for name in args.flatteners.split(",")]
     chosen: str | list[str] = "all" if names == ["all"] else names
     how: dict[str, Any] = {"progress": console.stage}
-    if ending(Path(args.points)) in MESH_ENDINGS:
+    if holds_surface(args.points):
         given: TriMesh | Floats = read_surface(args.points)
         _refuse_model_options(args)
     else:
@@ -259,7 +303,7 @@ def simulate(args: Namespace, console: Console) -> None:
         raise OptionError("simulate needs CASE and -o OUT, or --list")
     blocks = _count(args.blocks, "--blocks")
     outputs = Outputs.planned(
-        {"--output": (args.output, TABLE_ENDINGS)},
+        {"--output": (args.output, _POINTS_OUT)},
         overwrite=args.overwrite,
         watcher=console.journal,
     )

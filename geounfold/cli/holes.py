@@ -13,7 +13,7 @@ import numpy as np
 
 from geounfold.errors import OptionError
 from geounfold.io.polylines import write_polylines
-from geounfold.io.tables import TABLE_ENDINGS, ending, with_columns, write_table
+from geounfold.io.tables import TABLE_ENDINGS, check_writable, ending, with_columns, write_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from geounfold.mesh import Floats
 
 TRACE_ENDINGS = (*TABLE_ENDINGS, ".vtp")
+_XYZ = ("x", "y", "z")
 
-_AXES = ["x", "y", "z"]
 _NEEDS_HOLES = ("composite", "dip_positive_down", "holes_columns", "traces_out")
 
 Carry = Callable[["Floats"], dict[str, Any]]
@@ -65,7 +65,7 @@ class HoleData:
         """Return the result's columns of samples and traces, by output."""
         frames = {"samples": self.samples, "traces": self.traces}
         return {
-            name: carry(frame[_AXES].to_numpy(dtype=np.float64))
+            name: carry(frame[list(_XYZ)].to_numpy(dtype=np.float64))
             for name, frame in frames.items()
             if frame is not None
         }
@@ -73,7 +73,8 @@ class HoleData:
     def write(self, parts: Mapping[str, Path], results: Mapping[str, dict[str, Any]]) -> None:
         """Write the outputs that were asked for."""
         if self.samples is not None:
-            write_table(parts["--samples-out"], with_columns(self.samples, results["samples"]))
+            frame = with_columns(self.samples, results["samples"])
+            write_table(parts["--samples-out"], frame, columns=_XYZ)
         if self.traces is not None:
             _write_traces(parts["--traces-out"], self.traces, results["traces"])
 
@@ -115,10 +116,13 @@ def read_holes(args: Namespace, console: Console) -> HoleData | None:
     )
     for line in holes.messages():
         console.warn(line)
+    samples = None if args.samples_out is None else holes.samples(length)
+    if samples is not None:
+        check_writable(args.samples_out, samples)
     return HoleData(
         holes,
         length,
-        None if args.samples_out is None else holes.samples(length),
+        samples,
         None if args.traces_out is None else holes.traces(length),
     )
 
@@ -161,5 +165,5 @@ def _write_traces(path: Path, traces: pd.DataFrame, columns: dict[str, Any]) -> 
     }
     hole = traces["hole"].to_numpy()
     first = np.r_[0, np.flatnonzero(hole[1:] != hole[:-1]) + 1, len(hole)]
-    points = traces[_AXES].to_numpy(dtype=np.float64)
+    points = traces[list(_XYZ)].to_numpy(dtype=np.float64)
     write_polylines(path, points, first, point_data, {"hole": [str(h) for h in hole[first[:-1]]]})

@@ -14,6 +14,15 @@ from geounfold import _version
 from geounfold.errors import OptionError
 
 _TABLES = ".csv, .csv.gz or .parquet"
+_POINTS = f"{_TABLES}, or another format (see below)"
+_FORMATS = """
+
+formats of points: .csv .csv.gz .parquet, GSLIB .gslib .geoeas .dat .gs (text as codes), VTK .vtu
+  .vtp and .vti (read only; of solid cells the centres), GOCAD .vs (text as codes) and .ts (read
+  only), OMF 1 .omf, .geoh5
+formats of surfaces: .ply .obj .off .stl (single precision), .vtp, GOCAD .ts, .dxf (faces), .omf,
+  .geoh5, or a table with columns x, y, z, v1, v2, v3
+  OMF, geoh5 and DXF need: pip install 'geounfold[formats]'"""
 _RESULTS = """\
 results:
   unfolded_x, unfolded_y, unfolded_z   coordinates with the folds taken out, in the input's
@@ -40,7 +49,7 @@ with --inverse (columns unfolded_x/y/z are taken first where they exist):
 Every input column and row comes back in order. An input column called as a result is replaced
 in its place."""
 )
-_HOLES = """\
+_HOLES = """
 
 drill-holes: --samples-out has hole, from, to, x, y, z of each interval's midpoint (or composite's),
   position (surveyed, or extrapolated straight on beyond a hole's surveys), coverage of composites,
@@ -219,22 +228,22 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
 
 
 def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
-    parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD + _HOLES)
-    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_TABLES}")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_TABLES)
+    parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD + _HOLES + _FORMATS)
+    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_POINTS}")
+    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_POINTS)
     parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
     parser.add_argument("--map", metavar="M.npz", help="the map, for `geounfold map`")
     parser.add_argument("--report", metavar="R.html", help="figures and pictures")
     parser.add_argument(
         "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
     )
-    parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_TABLES}")
+    parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_POINTS}")
     parser.add_argument("--samples-out", metavar="Q", help="where they, or the holes' samples, go")
     parser.add_argument(
         "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
     )
     parser.add_argument(
-        "--top", metavar="T", help="the top surface: .ply, .obj, .stl, .off or a table"
+        "--top", metavar="T", help="the top surface: a mesh file or a table (see below)"
     )
     parser.add_argument("--bottom", metavar="B", help="the bottom surface")
     _add_columns(parser)
@@ -287,14 +296,21 @@ def _add_holes(parser: argparse.ArgumentParser) -> Any:
 
 def _add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> None:
     summary = "carry other points or drill-holes with a saved map"
-    parser = _add_command(commands, "map", summary, common, _MAP + _HOLES)
+    parser = _add_command(commands, "map", summary, common, _MAP + _HOLES + _FORMATS)
     parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
     # An optional POINTS would be missed behind an option, so it is there or it is not.
     if holes:
         parser.set_defaults(points=None)
     else:
-        parser.add_argument("points", metavar="POINTS", help=f"{_TABLES}; or give --holes instead")
-    parser.add_argument("-o", "--output", metavar="OUT", help=f"where POINTS go: {_TABLES}")
+        parser.add_argument(
+            "points", metavar="POINTS", help=f"{_POINTS}; or a surface; or give --holes instead"
+        )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help=f"where POINTS go: {_POINTS}; a surface as a mesh file keeps its triangles",
+    )
     parser.add_argument("--inverse", action="store_true", help="from unfolded to folded")
     _add_columns(parser)
     _add_holes(parser).add_argument("--samples-out", metavar="Q", help="where samples go")
@@ -307,7 +323,7 @@ def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "points",
         metavar="POINTS",
-        help=f"block centroids: {_TABLES}; or one surface: .ply, .obj, .stl or .off",
+        help=f"block centroids: {_TABLES}; or one surface: .ply, .obj, .stl, .off, .ts, .dxf ...",
     )
     parser.add_argument("-o", "--output", metavar="TABLE", required=True, help=_TABLES)
     parser.add_argument(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import pandas as pd
 from geounfold.errors import InputError
 from geounfold.io._text import counted, rows_named
 from geounfold.io.coordinates import LARGEST_COORDINATE, Triple, coordinate_columns, numbers
-from geounfold.io.tables import read_table, with_columns, write_table
+from geounfold.io.tables import check_writable, read_table, with_columns, write_table
 from geounfold.mesh import Bools, Floats, Ints
 
 
@@ -35,6 +36,8 @@ class PointTable:
         The data rows left out for want of finite coordinates (1 is the first after the header).
     text : bool
         True where the columns are text because the file is a CSV.
+    meta : dict of str
+        Unit and coordinate reference, where the file tells them.
     """
 
     source: str
@@ -43,6 +46,7 @@ class PointTable:
     points: Floats
     dropped: Ints
     text: bool
+    meta: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -85,8 +89,16 @@ class PointTable:
     def write(self, path: str | Path, columns: dict[str, Any]) -> None:
         """Write the table with results added, by the path's ending."""
         frame = self.with_columns(columns)
-        own = tuple(str(n) for n in self.frame.columns if n not in columns) if self.text else ()
-        write_table(path, frame, text=own)
+        own = tuple(n for n in self._text_columns if n not in columns)
+        write_table(path, frame, text=own, columns=self.columns, meta=self.meta)
+
+    def check_writable(self, path: str | Path) -> None:
+        """Raise OutputError where a file of this ending cannot hold the table's columns."""
+        check_writable(path, self.frame, self._text_columns)
+
+    @property
+    def _text_columns(self) -> tuple[str, ...]:
+        return tuple(str(n) for n in self.frame.columns) if self.text else ()
 
     def facts(self) -> dict[str, Any]:
         """Return what was read, for a summary."""
@@ -97,6 +109,7 @@ class PointTable:
             "dropped_invalid": len(self.dropped),
             "dropped_rows": self.dropped[:100].tolist(),
             "duplicates": self.duplicates,
+            **self.meta,
         }
 
 
@@ -107,7 +120,7 @@ def read_points(
     prefer: tuple[Triple, ...] = (),
     drop_invalid: bool = False,
 ) -> PointTable:
-    """Return the points of a ``.csv``, ``.csv.gz`` or ``.parquet`` file.
+    """Return the points of a file: a table, or any format of `geounfold.io.formats`.
 
     Parameters
     ----------
@@ -130,7 +143,7 @@ def read_points(
     table = read_table(path)
     names = [str(name) for name in table.frame.columns]
     if columns is None:
-        columns = next((p for p in prefer if set(p) <= set(names)), None)
+        columns = next((p for p in prefer if set(p) <= set(names)), table.columns)
     where = coordinate_columns(names, columns, source=source)
     axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
     points = np.column_stack(axes)
@@ -145,7 +158,7 @@ def read_points(
     if len(dropped):
         frame, points = frame.loc[valid].reset_index(drop=True), points[valid]
     a, b, c = (names[i] for i in where)
-    return PointTable(source, frame, (a, b, c), points, dropped, table.text)
+    return PointTable(source, frame, (a, b, c), points, dropped, table.text, table.meta)
 
 
 def _invalid(rows: Ints, total: int, source: str) -> InputError:

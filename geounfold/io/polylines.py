@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from geounfold.io.formats.vtk import add_text
 from geounfold.mesh import Floats, Ints
 
 
@@ -43,5 +44,5 @@ def write_polylines(
     for name, values in point_data.items():
         mesh.point_data[name] = values
     for name, words in line_data.items():
-        mesh.cell_data[name] = list(words)
+        add_text(mesh.GetCellData(), name, words)
     mesh.save(path, binary=True)

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy.spatial import Delaunay
 
-from geounfold.errors import BackendError, InputError, MeshError
-from geounfold.io._text import listing
-from geounfold.io.coordinates import numbers
+from geounfold.errors import BackendError, InputError, MeshError, OutputError
+from geounfold.io._text import listing, rows_named
+from geounfold.io.coordinates import coordinate_columns, numbers
+from geounfold.io.formats import Surface, find_format, point_endings, surface_endings
 from geounfold.io.points import PointTable, read_points
-from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file
-from geounfold.mesh import Floats, Ints, TriMesh
+from geounfold.io.tables import (
+    TABLE_ENDINGS,
+    Table,
+    ending,
+    existing_file,
+    read_table,
+    write_table,
+)
+from geounfold.mesh import Bools, Floats, Ints, TriMesh
 
-MESH_ENDINGS = (".ply", ".obj", ".stl", ".off")
+MESH_ENDINGS = surface_endings()
 SURFACE_ENDINGS = (*MESH_ENDINGS, *TABLE_ENDINGS)
 _CORNERS = (("v1", "v2", "v3"), ("v0", "v1", "v2"))
 _LONG_EDGE = 4.0  # of the median edge: what the triangulation spans beyond the points' outline
@@ -26,9 +35,9 @@ _MOST_STEEP = 0.02  # share of upright triangles; a sheet that does not overhang
 def read_surface(path: str | Path) -> TriMesh:
     """Return the triangulated surface of a file.
 
-    Mesh files end in .ply, .obj, .stl or .off. A table (.csv, .csv.gz, .parquet) holds one
-    vertex per row, and triangle k's three vertices beside vertex k in columns v1, v2, v3 (from
-    1) or v0, v1, v2 (from 0), blank in the rows beyond the last triangle. A table of vertices
+    Mesh files end as `MESH_ENDINGS`. A table (.csv, .csv.gz, .parquet) holds one vertex per row,
+    and in row k triangle k's three vertices in columns v1, v2, v3 (from 1) or v0, v1, v2 (from 0);
+    where there are more of one than of the other, the last rows are blank. A table of vertices
     alone is triangulated over its mean plane, which asks that the surface nowhere overhangs it.
 
     Raises
@@ -36,57 +45,127 @@ def read_surface(path: str | Path) -> TriMesh:
     InputError
         An unknown ending, a file that cannot be read, fewer than one triangle, vertex numbers
         out of range, or vertices alone that overhang their mean plane.
+    MissingDependencyError
+        A file whose library is not installed.
     """
+    return read_surface_with_meta(path)[0]
+
+
+def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]]:
+    """Return the surface of a file, and its unit and coordinate reference where it tells them."""
     path = Path(path)
     kind = ending(path)
+    existing_file(path)
     if kind not in SURFACE_ENDINGS:
-        existing_file(path)
         raise InputError(
             f"{path}: unknown kind of surface '{kind}'; files end in {', '.join(SURFACE_ENDINGS)}"
         )
+    meta: Mapping[str, str] = {}
     try:
-        mesh = _from_mesh_file(path) if kind in MESH_ENDINGS else _from_table(read_points(path))
+        found = find_format(kind, "reads_surface")
+        if found is None:
+            mesh = _from_table(path)
+        else:
+            surface = found.load().read_surface(path)
+            mesh, meta = TriMesh(surface.V, surface.F), surface.meta
     except (MeshError, BackendError) as error:
         raise InputError(f"{path}: is not a surface: {' '.join(str(error).split())}") from error
     if not len(mesh.F):
         raise InputError(f"{path}: the surface has no triangles")
-    return mesh
+    return mesh, meta
 
 
-def _from_mesh_file(path: Path) -> TriMesh:
-    from geounfold.backends import meshlab
+def holds_surface(path: str | Path) -> bool:
+    """Return whether a file is a surface: by its ending, or by its content where that may be both.
 
-    existing_file(path)
-    vertices, faces = meshlab.read_mesh(path)
-    return TriMesh(vertices, faces)
+    Raises
+    ------
+    InputError
+        No such file.
+    """
+    path = existing_file(Path(path))
+    kind = ending(path)
+    if kind not in MESH_ENDINGS or kind == ".ts" or kind not in point_endings():
+        return kind in MESH_ENDINGS
+    try:
+        read_surface(path)
+    except InputError:
+        return False
+    return True
 
 
-def _from_table(table: PointTable) -> TriMesh:
+def write_surface(path: str | Path, mesh: TriMesh, meta: Mapping[str, str] | None = None) -> None:
+    """Write a surface by the path's ending, tables with columns x, y, z, v1, v2, v3.
+
+    Coordinates come back bit for bit but from .stl, which is in single precision, and tables and
+    meshes with vertices in their order, but from .stl and .dxf, which do not number them. The
+    file is written in place: see `replacing`.
+
+    Raises
+    ------
+    OutputError
+        An unknown ending, or values that the format cannot hold.
+    MissingDependencyError
+        A file whose library is not installed.
+    """
+    path = Path(path)
+    kind = ending(path)
+    found = find_format(kind, "writes_surface")
+    if found is not None:
+        found.load().write_surface(path, Surface(mesh.V, mesh.F, meta or {}))
+    elif kind in TABLE_ENDINGS:
+        rows = range(max(len(mesh.V), len(mesh.F)))
+        vertices = pd.DataFrame(mesh.V, columns=["x", "y", "z"]).reindex(rows)
+        corners = pd.DataFrame(mesh.F + 1, columns=["v1", "v2", "v3"], dtype="Int64").reindex(rows)
+        write_table(path, pd.concat([vertices, corners], axis=1))
+    else:
+        known = ", ".join((*surface_endings(writing=True), *TABLE_ENDINGS))
+        raise OutputError(f"{path}: unknown kind of surface '{kind}'; files end in {known}")
+
+
+def _from_table(path: Path) -> TriMesh:
     """Return the surface of a table with or without triangles."""
+    table = read_table(path)
     names = [str(n).strip().casefold() for n in table.frame.columns]
     for base, corners in ((1, _CORNERS[0]), (0, _CORNERS[1])):
         if set(corners) <= set(names):
             columns = [table.frame.iloc[:, names.index(c)] for c in corners]
-            return TriMesh(table.points, _triangles(columns, base, table))
+            points = _vertices(table, str(path))
+            return TriMesh(points, _triangles(columns, base, len(points), str(path)))
     if {"v1", "v2", "v0", "v3"} & set(names):
         found = [n for n in names if n in {"v0", "v1", "v2", "v3"}]
         raise InputError(
-            f"{table.source}: triangles need columns v1, v2, v3 or v0, v1, v2, not {listing(found)}"
+            f"{path}: triangles need columns v1, v2, v3 or v0, v1, v2, not {listing(found)}"
         )
-    return _draped(table)
+    return _draped(read_points(path))
 
 
-def _triangles(columns: list[pd.Series], base: int, table: PointTable) -> Ints:
+def _vertices(table: Table, source: str) -> Floats:
+    """Return the vertices of a table that has triangles: rows below the last one have none."""
+    where = coordinate_columns([str(n) for n in table.frame.columns], source=source)
+    axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
+    points = np.column_stack(axes)
+    whole: Bools = np.asarray(np.isfinite(points).all(axis=1))
+    count = int(np.flatnonzero(whole)[-1]) + 1 if whole.any() else 0
+    bad = np.flatnonzero(~whole[:count]) + 1
+    partly = np.flatnonzero(~np.isnan(points[count:]).all(axis=1)) + 1 + count
+    if len(bad) or len(partly) or not count:
+        rows = rows_named([*bad.tolist(), *partly.tolist()] or [1])
+        raise InputError(f"{source}: missing or infinite coordinates of vertices: {rows}")
+    return points[:count]
+
+
+def _triangles(columns: list[pd.Series], base: int, count: int, source: str) -> Ints:
     """Return vertex numbers (m, 3) from 0; rows beyond the last triangle are blank."""
-    corners = np.column_stack([numbers(column, source=table.source) for column in columns])
+    corners = np.column_stack([numbers(column, source=source) for column in columns])
     corners = corners[~np.isnan(corners).all(axis=1)]
     whole = np.isfinite(corners).all(axis=1) & (corners == np.round(corners)).all(axis=1)
-    inside = whole & ((corners >= base) & (corners < base + len(table))).all(axis=1)
+    inside = whole & ((corners >= base) & (corners < base + count)).all(axis=1)
     if not inside.all():
         k = int(np.flatnonzero(~inside)[0])
         raise InputError(
-            f"{table.source}: triangle {k + 1} has vertices {corners[k].tolist()}, but vertices "
-            f"are numbered {base} to {base + len(table) - 1}"
+            f"{source}: triangle {k + 1} has vertices {corners[k].tolist()}, but vertices "
+            f"are numbered {base} to {base + count - 1}"
         )
     return np.asarray(corners.astype(np.int64) - base, dtype=np.int64)
 

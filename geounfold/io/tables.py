@@ -13,9 +13,9 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from geounfold.errors import InputError, MissingDependencyError
+from geounfold.errors import InputError, MissingDependencyError, OutputError
 from geounfold.io._text import shown
 
 if TYPE_CHECKING:
@@ -55,10 +55,17 @@ class Table:
         Columns in the file's order under the file's names, even where two are called alike.
     text : bool
         True for a CSV, whose columns are all text.
+    columns : three str, optional
+        Names of the coordinates, where the file is one of points and not of columns.
+    meta : dict of str
+        Unit (``unit``) and coordinate reference (``crs``) of the coordinates, where the file
+        tells them.
     """
 
     frame: pd.DataFrame
     text: bool
+    columns: tuple[str, str, str] | None = None
+    meta: Mapping[str, str] = field(default_factory=dict)
 
 
 def ending(path: Path) -> str:
@@ -98,7 +105,9 @@ def existing_file(path: Path) -> Path:
 
 
 def read_table(path: str | Path) -> Table:
-    """Return the table in a ``.csv``, ``.csv.gz`` or ``.parquet`` file.
+    """Return the table in a ``.csv``, ``.csv.gz`` or ``.parquet`` file, or one of other formats.
+
+    Those are of `geounfold.io.formats`; their points are columns x, y, z.
 
     A CSV is UTF-8 (with or without a byte-order mark), its first row names the columns, and
     commas, semicolons or tabs separate them (found from the first row).
@@ -108,19 +117,33 @@ def read_table(path: str | Path) -> Table:
     InputError
         The file is missing, empty, a directory, no table, damaged, or holds no rows.
     MissingDependencyError
-        A Parquet file without pyarrow installed.
+        A file whose library is not installed.
     """
     path = Path(path)
     kind = ending(path)
     existing_file(path)
-    if kind not in TABLE_ENDINGS:
-        raise InputError(
-            f"{path}: unknown kind of table '{kind}'; files end in {', '.join(TABLE_ENDINGS)}"
-        )
-    table = _read_parquet(path) if kind == ".parquet" else _read_csv(path)
+    if kind in TABLE_ENDINGS:
+        table = _read_parquet(path) if kind == ".parquet" else _read_csv(path)
+    else:
+        table = _read_format(path, kind)
     if not len(table.frame):
         raise InputError(f"{path}: the table has a header but no rows")
     return table
+
+
+def _read_format(path: Path, kind: str) -> Table:
+    """Return the points of a file of another format as a table."""
+    from geounfold.io.formats import find_format, frames, point_endings
+
+    found = find_format(kind, "reads_points")
+    if found is None:
+        endings = ", ".join((*TABLE_ENDINGS, *point_endings()))
+        raise InputError(f"{path}: unknown kind of table '{kind}'; files end in {endings}")
+    module = found.load()
+    if hasattr(module, "read_frame"):
+        return Table(module.read_frame(path), text=False)
+    points = module.read_points(path)
+    return Table(frames.to_frame(points), False, ("x", "y", "z"), points.meta)
 
 
 @contextmanager
@@ -280,7 +303,14 @@ def with_columns(frame: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
     return out
 
 
-def write_table(path: str | Path, frame: pd.DataFrame, *, text: tuple[str, ...] = ()) -> None:
+def write_table(
+    path: str | Path,
+    frame: pd.DataFrame,
+    *,
+    text: tuple[str, ...] = (),
+    columns: tuple[str, str, str] | None = None,
+    meta: Mapping[str, str] | None = None,
+) -> None:
     """Write a table by the path's ending; floats come back bit for bit.
 
     Missing values (NaN) are empty. The frame's index is not written. The file is written in
@@ -289,17 +319,23 @@ def write_table(path: str | Path, frame: pd.DataFrame, *, text: tuple[str, ...] 
     Parameters
     ----------
     path : path
-        Ends in .csv, .csv.gz or .parquet.
+        Ends in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`.
     frame : DataFrame
         The table.
     text : names of columns, optional
-        Columns that come from a CSV and whose types a Parquet file should find out: integers
+        Columns that come from a CSV and whose types another file should find out: integers
         or floats where every value is one, else text.
+    columns : three str, optional
+        Names of the coordinates, for formats of points (found by name without).
+    meta : dict of str, optional
+        Unit and coordinate reference, for formats that have them.
 
     Raises
     ------
     MissingDependencyError
-        A Parquet file without pyarrow installed.
+        A file whose library is not installed.
+    OutputError
+        Values that the format cannot hold.
     """
     path = Path(path)
     kind = ending(path)
@@ -308,9 +344,68 @@ def write_table(path: str | Path, frame: pd.DataFrame, *, text: tuple[str, ...] 
     elif kind == ".csv.gz":
         with path.open("wb") as raw, gzip.GzipFile("", "wb", 3, raw, mtime=0) as stream:
             stream.write(_csv_text(frame).encode("utf-8"))
-    else:
+    elif kind == ".csv":
         with path.open("w", encoding="utf-8", newline="") as plain:
             plain.write(_csv_text(frame))
+    else:
+        _write_format(path, _all_typed(frame, text), columns, meta or {})
+
+
+def check_writable(path: str | Path, frame: pd.DataFrame, text: tuple[str, ...] = ()) -> None:
+    """Raise what `write_table` would raise at the end, before anything is computed.
+
+    Raises
+    ------
+    MissingDependencyError
+        The format's library is not installed.
+    OutputError
+        A column has too many texts for a format that holds numbers only.
+    """
+    from geounfold.io.formats import find_format, frames
+
+    found = find_format(ending(Path(path)), "writes_points")
+    if found is not None:
+        found.check_library()
+    if found is not None and found.numbers_only:
+        for i, name in enumerate(frame.columns):
+            column = frame.iloc[:, i]
+            values = frames.typed_values(_typed(column) if name in text else column)
+            frames.coded(str(name), values, found.name)
+
+
+def _all_typed(frame: pd.DataFrame, text: tuple[str, ...]) -> pd.DataFrame:
+    """Return a frame whose columns from a CSV have the types they show."""
+    series = [
+        _typed(frame.iloc[:, i]) if name in text else frame.iloc[:, i]
+        for i, name in enumerate(frame.columns)
+    ]
+    whole: pd.DataFrame = pd.concat([s.reset_index(drop=True) for s in series], axis=1)
+    whole.columns = frame.columns
+    return whole
+
+
+def _write_format(
+    path: Path,
+    frame: pd.DataFrame,
+    columns: tuple[str, str, str] | None,
+    meta: Mapping[str, str],
+) -> None:
+    """Write a table's rows as points of another format."""
+    from geounfold.io.coordinates import coordinate_columns
+    from geounfold.io.formats import find_format, frames
+
+    found = find_format(ending(path), "writes_points")
+    if found is None:
+        raise OutputError(f"{path}: points cannot be written as '{ending(path)}'")
+    module = found.load()
+    if hasattr(module, "write_frame"):
+        module.write_frame(path, frame, meta)
+        return
+    names = [str(name) for name in frame.columns]
+    where = coordinate_columns(names, columns, source=str(path))
+    xyz = np.column_stack([frame.iloc[:, i].to_numpy(dtype=np.float64) for i in where])
+    named = tuple(names[i] for i in where)
+    module.write_points(path, frames.to_points(frame, xyz, named, meta))
 
 
 def _csv_text(frame: pd.DataFrame) -> str:

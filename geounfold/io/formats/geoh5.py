@@ -1,0 +1,169 @@
+"""geoh5, the open format of Geoscience ANALYST, through geoh5py (extra ``formats``).
+
+One object of a workspace is read: points, else a block model's cells; or a surface. The object's
+coordinate reference and the workspace's unit are carried. Floats come back bit for bit, whole
+numbers beyond 32 bits as floats.
+
+geoh5py asks for NumPy below 2 on Python 3.11, which geounfold does not work with: the extra
+brings it from Python 3.12 on.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import InputError, MissingDependencyError, OutputError
+from geounfold.io._text import listing
+from geounfold.io.formats.frames import flattened
+from geounfold.io.formats.registry import Meta, Points, Surface, require
+from geounfold.io.formats.units import unit_name
+
+_WORDS = {"m": "meter", "ft": "feet"}
+_LARGEST = 2**31 - 1
+_OWN = {"Visual Parameters", "A3D Node Data", "UserComments"}
+
+
+def read_points(path: Path) -> Points:
+    """Return the one set of points of a workspace, or the one block model's cells.
+
+    Raises
+    ------
+    InputError
+        Not a geoh5 file, or not one such object.
+    """
+    with _workspace(path) as (workspace, objects):
+        points = _one(path, workspace, objects.Points)
+        if points is not None:
+            xyz, location = np.asarray(points.vertices, dtype=np.float64), "VERTEX"
+        else:
+            points = _one(path, workspace, objects.BlockModel)
+            if points is None:
+                raise InputError(f"{path}: holds neither points nor a block model")
+            xyz, location = np.asarray(points.centroids, dtype=np.float64), "CELL"
+        return Points(xyz, _values(points, location, len(xyz)), _meta(workspace, points))
+
+
+def write_points(path: Path, points: Points) -> None:
+    """Write a workspace of one set of points."""
+    if not np.isfinite(points.xyz).all():
+        raise OutputError("geoh5 files need finite coordinates")
+    data: dict[str, Any] = {}
+    for name, values in points.data.items():
+        if values.dtype == object:
+            data[name] = {"values": values.astype(str), "type": "text"}
+        elif values.dtype.kind == "i" and np.abs(values).max(initial=0) < _LARGEST:
+            data[name] = {"values": values.astype(np.int32)}
+        else:
+            data[name] = {"values": values.astype(np.float64)}
+    with _created(path, points.meta) as (workspace, objects):
+        made = objects.Points.create(workspace, name=path.stem, vertices=points.xyz)
+        _refer(made, points.meta)
+        if data:
+            made.add_data(data)
+
+
+def read_surface(path: Path) -> Surface:
+    """Return the one surface of a workspace."""
+    with _workspace(path) as (workspace, objects):
+        surface = _one(path, workspace, objects.Surface)
+        if surface is None:
+            raise InputError(f"{path}: holds no surface")
+        return Surface(
+            np.asarray(surface.vertices, dtype=np.float64),
+            np.asarray(surface.cells, dtype=np.int64),
+            _meta(workspace, surface),
+        )
+
+
+def write_surface(path: Path, surface: Surface) -> None:
+    """Write a workspace of one surface."""
+    with _created(path, surface.meta) as (workspace, objects):
+        made = objects.Surface.create(
+            workspace, name=path.stem, vertices=surface.V, cells=surface.F
+        )
+        _refer(made, surface.meta)
+
+
+def _library() -> tuple[ModuleType, ModuleType]:
+    """Return the library's workspaces and objects."""
+    library = require("geoh5py.workspace", "geoh5")
+    if not hasattr(library.Workspace, "create"):
+        raise MissingDependencyError(
+            "geoh5 files need geoh5py 0.13 or later, which is here from Python 3.12 on: "
+            "pip install 'geounfold[formats]' there"
+        )
+    return library, require("geoh5py.objects", "geoh5")
+
+
+@contextmanager
+def _workspace(path: Path) -> Iterator[tuple[Any, Any]]:
+    """Yield a file's workspace and the library's objects."""
+    library, objects = _library()
+    try:
+        workspace = library.Workspace(path, mode="r")
+    except Exception as error:  # the library raises whatever its parts do
+        words = " ".join(str(error).split())
+        raise InputError(f"{path}: is not a geoh5 file, or is damaged: {words}") from error
+    with workspace:
+        yield workspace, objects
+
+
+@contextmanager
+def _created(path: Path, meta: Meta) -> Iterator[tuple[Any, Any]]:
+    """Yield a new workspace and the library's objects."""
+    library, objects = _library()
+    unit = meta.get("unit", "m")
+    with (
+        warnings.catch_warnings(),
+        library.Workspace.create(path, distance_unit=_WORDS.get(unit, unit)) as workspace,
+    ):
+        warnings.simplefilter("ignore")
+        yield workspace, objects
+
+
+def _one(path: Path, workspace: Any, kind: Any) -> Any:
+    """Return the only object of exactly this kind, or None where there is none."""
+    found = [o for o in workspace.objects if type(o) is kind]
+    if len(found) > 1:
+        raise InputError(
+            f"{path}: holds several objects of one kind ({listing(o.name for o in found)}); "
+            "export the one that is meant"
+        )
+    return found[0] if found else None
+
+
+def _values(parent: Any, location: str, rows: int) -> dict[str, np.ndarray]:
+    """Return an object's data; referenced ones as their words."""
+    columns: dict[str, np.ndarray] = {}
+    for child in parent.children:
+        association = getattr(getattr(child, "association", None), "name", "")
+        values = getattr(child, "values", None)
+        if association != location or values is None or child.name in _OWN:
+            continue
+        array = np.asarray(values)
+        named = getattr(child, "value_map", None)
+        if named is not None:
+            words = dict(named.map)
+            array = np.array([str(words.get(int(v), "")) for v in array], dtype=object)
+        if array.size and array.size % rows == 0:
+            columns |= flattened(child.name, array, rows)
+    return columns
+
+
+def _refer(made: Any, meta: Meta) -> None:
+    if "crs" in meta:
+        made.coordinate_reference_system = {"Code": meta["crs"], "Name": meta["crs"]}
+
+
+def _meta(workspace: Any, found: Any) -> Meta:
+    meta = {"unit": unit_name(str(workspace.distance_unit))}
+    reference = found.coordinate_reference_system or {}
+    code = str(reference.get("Code", "Unknown"))
+    return meta if code == "Unknown" else {**meta, "crs": code}

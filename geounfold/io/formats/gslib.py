@@ -1,0 +1,108 @@
+"""GSLIB, or simplified GeoEAS: a title, the number of columns, their names, rows of numbers.
+
+Deutsch and Journel 1998, *GSLIB: Geostatistical Software Library*, appendix B. The format has no
+sign for a missing value; what we write names one in the title, and reading takes that one only, as
+-999 may be a value in other files. Numbers come back bit for bit.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError
+from geounfold.io._text import shown
+from geounfold.io.formats.frames import coded, missing_code, typed_values
+from geounfold.io.formats.registry import Meta
+
+_MISSING = re.compile(r"missing values are (\S+)")
+_MOST_COLUMNS = 10_000
+
+
+def read_frame(path: Path) -> pd.DataFrame:
+    """Return the columns as numbers, names that are there twice numbered.
+
+    Raises
+    ------
+    InputError
+        The header is no GSLIB header, a row is short, or a value is no number.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not a GSLIB file: it is no text in UTF-8") from error
+    words = lines[1].split() if len(lines) > 1 else []
+    if not words or not words[0].isdecimal() or not 1 <= int(words[0]) <= _MOST_COLUMNS:
+        raise InputError(
+            f"{path}: is not a GSLIB file: its second line must begin with the number of columns, "
+            f"not '{shown(lines[1] if len(lines) > 1 else '')}'"
+        )
+    count = int(words[0])
+    names = [line.strip() for line in lines[2 : 2 + count]]
+    rows = [(k, line.split()) for k, line in enumerate(lines[2 + count :], 3 + count)]
+    rows = [(k, row) for k, row in rows if row]
+    for k, row in rows:
+        if len(row) != count:
+            raise InputError(
+                f"{path}: line {k} has {len(row)} values, but there are {count} columns"
+            )
+    if len(names) < count or not rows:
+        raise InputError(f"{path}: the GSLIB header names {count} columns, but no row follows")
+    try:
+        values = np.array([row for _, row in rows], dtype=np.float64)
+    except ValueError:
+        raise InputError(f"{path}: {_first_word(rows)}") from None
+    said = _MISSING.search(lines[0])
+    if said:
+        values[values == float(said.group(1))] = np.nan
+    return pd.DataFrame(dict(zip(_unique(names), values.T, strict=True)))
+
+
+def _first_word(rows: list[tuple[int, list[str]]]) -> str:
+    """Return where the first value is that is no number."""
+    for k, row in rows:
+        for word in row:
+            try:
+                float(word)
+            except ValueError:
+                return f"line {k} has '{shown(word)}', which is no number"
+    return "a value is no number"
+
+
+def _unique(names: list[str]) -> list[str]:
+    """Return names, numbered where they are there already.
+
+    Examples
+    --------
+    >>> _unique(["au", "cu", "au"])
+    ['au', 'cu', 'au_2']
+    """
+    made: list[str] = []
+    for name in names:
+        number = 1
+        while (unique := name if number == 1 else f"{name}_{number}") in made:
+            number += 1
+        made.append(unique)
+    return made
+
+
+def write_frame(path: Path, frame: pd.DataFrame, meta: Meta) -> None:
+    """Write columns of numbers as they are, texts as codes that the title names."""
+    made = {
+        str(name): coded(str(name), typed_values(frame.iloc[:, i]), "GSLIB")
+        for i, name in enumerate(frame.columns)
+    }
+    columns = [values for values, _ in made.values()]
+    code = missing_code(columns)
+    legends = [legend for _, legend in made.values() if legend]
+    title = ["geounfold", *(f"{k} {v}" for k, v in meta.items()), *legends]
+    if code is not None:
+        title.append(f"missing values are {code!r}")
+        columns = [np.where(np.isnan(c), code, c) if c.dtype.kind == "f" else c for c in columns]
+    head = ["; ".join(" ".join(t.split()) for t in title), str(len(made))]
+    head += [" ".join(name.split()) or "column" for name in made]
+    rows = map(" ".join, zip(*(map(repr, c.tolist()) for c in columns), strict=True))
+    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")

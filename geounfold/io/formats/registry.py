@@ -1,0 +1,141 @@
+"""Which ending is which format, what it holds, and what passes to and from its module."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import ModuleType
+
+import numpy as np
+
+from geounfold.errors import MissingDependencyError
+from geounfold.mesh import Floats, Ints
+
+Meta = Mapping[str, str]
+"""What is known of a file's coordinates: ``unit`` and ``crs``, where the format has them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points with values beside them.
+
+    Attributes
+    ----------
+    xyz : (n, 3) float
+        Coordinates, z up.
+    data : dict of (n,) arrays
+        By name: float64 (NaN where missing), int64, or text as objects (empty where missing).
+    meta : dict of str
+        Unit and coordinate reference, where known.
+    """
+
+    xyz: Floats
+    data: Mapping[str, np.ndarray]
+    meta: Meta = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A triangulated surface.
+
+    Attributes
+    ----------
+    V : (n, 3) float
+        Vertices, z up.
+    F : (m, 3) int
+        Triangles.
+    meta : dict of str
+        Unit and coordinate reference, where known.
+    """
+
+    V: Floats
+    F: Ints
+    meta: Meta = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Format:
+    """One family of files.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    module : str
+        In this package.
+    reads_points, writes_points, reads_surface, writes_surface : tuple of str
+        The endings that hold these.
+    numbers_only : bool
+        Text columns cannot be written (see `coded`).
+    library : str
+        The optional one that the module needs; empty for none.
+    """
+
+    name: str
+    module: str
+    reads_points: tuple[str, ...] = ()
+    writes_points: tuple[str, ...] = ()
+    reads_surface: tuple[str, ...] = ()
+    writes_surface: tuple[str, ...] = ()
+    numbers_only: bool = False
+    library: str = ""
+
+    def check_library(self) -> None:
+        """Raise MissingDependencyError where the format's library is not installed."""
+        if self.library:
+            require(self.library, self.name)
+
+    def load(self) -> ModuleType:
+        """Return the module."""
+        return import_module(f"geounfold.io.formats.{self.module}")
+
+
+_GSLIB = (".gslib", ".geoeas", ".dat", ".gs")
+_MESHES = (".ply", ".obj", ".stl", ".off")
+
+FORMATS = (
+    Format("GSLIB (GeoEAS)", "gslib", _GSLIB, _GSLIB, numbers_only=True),
+    Format("VTK", "vtk", (".vtu", ".vtp", ".vti"), (".vtu", ".vtp"), (".vtp",), (".vtp",)),
+    Format("GOCAD", "gocad", (".vs", ".ts"), (".vs",), (".ts",), (".ts",), numbers_only=True),
+    Format("OMF", "omf", (".omf",), (".omf",), (".omf",), (".omf",), library="omf"),
+    Format("geoh5", "geoh5", (".geoh5",), (".geoh5",), (".geoh5",), (".geoh5",), library="geoh5py"),
+    Format("DXF", "dxf", (), (), (".dxf",), (".dxf",), library="ezdxf"),
+    Format("mesh", "meshes", (), (), _MESHES, _MESHES),
+)
+"""All formats but tables."""
+
+
+def find_format(kind: str, what: str) -> Format | None:
+    """Return the format of an ending that ``reads_points``, ``writes_surface`` ...; or None.
+
+    Examples
+    --------
+    >>> find_format(".ts", "reads_surface").name
+    'GOCAD'
+    >>> find_format(".ts", "writes_points") is None
+    True
+    """
+    return next((f for f in FORMATS if kind in getattr(f, what)), None)
+
+
+def point_endings(*, writing: bool = False) -> tuple[str, ...]:
+    """Return the endings of files of points that can be read, or written."""
+    return sum((f.writes_points if writing else f.reads_points for f in FORMATS), ())
+
+
+def surface_endings(*, writing: bool = False) -> tuple[str, ...]:
+    """Return the endings of files of surfaces that can be read, or written."""
+    return sum((f.writes_surface if writing else f.reads_surface for f in FORMATS), ())
+
+
+def require(name: str, what: str) -> ModuleType:
+    """Return an optional library, or raise MissingDependencyError that names its extra."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        package = name.partition(".")[0]
+        where = " (from Python 3.12 on)" if package == "geoh5py" else ""
+        raise MissingDependencyError(
+            f"{what} files need {package}: pip install 'geounfold[formats]'{where}"
+        ) from error

@@ -1,0 +1,150 @@
+"""VTK's XML files through pyvista: points, block models and triangles.
+
+Floats are written and read as float64, bit for bit. Unit and coordinate reference are field data
+called ``unit`` and ``crs``, as VTK has no place of its own for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import InputError
+from geounfold.io.formats.frames import flattened
+from geounfold.io.formats.registry import Meta, Points, Surface
+
+_META = ("unit", "crs")
+
+
+def read_points(path: Path) -> Points:
+    """Return the centres of a file's solid cells with cell data; without any, its points.
+
+    Cells that VTK hides as ghosts are left out.
+    """
+    mesh = _read(path)
+    solid = _solid(mesh)
+    if solid.any():
+        hidden = mesh.cell_data.get("vtkGhostType", np.zeros(mesh.n_cells, dtype=np.uint8))
+        keep = solid & (np.asarray(hidden) == 0)
+        centres = np.asarray(mesh.cell_centers().points, dtype=np.float64)
+        return Points(centres[keep], _values(mesh.cell_data, mesh.n_cells, keep), _meta(mesh))
+    if not mesh.n_points:
+        raise InputError(f"{path}: holds no points")
+    keep = np.ones(mesh.n_points, dtype=bool)
+    data = mesh.point_data
+    points = np.asarray(mesh.points, dtype=np.float64)
+    # One vertex cell for each point, as we write them, may carry the values instead.
+    if mesh.n_cells == mesh.n_points and not len(data) and len(mesh.cell_data):
+        data, points = mesh.cell_data, np.asarray(mesh.cell_centers().points, dtype=np.float64)
+    return Points(points, _values(data, mesh.n_points, keep), _meta(mesh))
+
+
+def write_points(path: Path, points: Points) -> None:
+    """Write points as vertices with point data (.vtp poly data, .vtu unstructured grid)."""
+    import pyvista
+
+    cloud: Any = pyvista.PolyData(np.ascontiguousarray(points.xyz))
+    for name, values in points.data.items():
+        if values.dtype == object:
+            add_text(cloud.GetPointData(), name, values)
+        else:
+            cloud.point_data[name] = values
+    if path.suffix.lower() == ".vtu":
+        cloud = cloud.cast_to_unstructured_grid()
+    _save(cloud, path, points.meta)
+
+
+def read_surface(path: Path) -> Surface:
+    """Return a poly data file's faces, polygons cut into triangles."""
+    mesh = _read(path)
+    if not mesh.GetNumberOfPolys() + mesh.GetNumberOfStrips():
+        raise InputError(f"{path}: holds no faces")
+    triangles = mesh.triangulate()
+    return Surface(
+        np.asarray(triangles.points, dtype=np.float64),
+        np.asarray(triangles.regular_faces, dtype=np.int64),
+        _meta(mesh),
+    )
+
+
+def write_surface(path: Path, surface: Surface) -> None:
+    """Write triangles as poly data."""
+    import pyvista
+
+    mesh = pyvista.PolyData.from_regular_faces(np.ascontiguousarray(surface.V), surface.F)
+    _save(mesh, path, surface.meta)
+
+
+def add_text(data: Any, name: str, words: Iterable[str]) -> None:
+    """Add texts to a VTK object's point, cell or field data; pyvista itself takes ASCII only."""
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    array = vtkStringArray()
+    array.SetName(name)
+    for word in words:
+        array.InsertNextValue(str(word))
+    data.AddArray(array)
+
+
+def _read(path: Path) -> Any:
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    # VTK says what is wrong on stderr; its readers' error code tells it too.
+    shown = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.GlobalWarningDisplayOff()
+    try:
+        reader = pyvista.get_reader(path)
+        mesh = reader.read()
+        code = reader.reader.GetErrorCode()
+    except (ValueError, TypeError, RuntimeError, OSError, AttributeError) as error:
+        raise InputError(f"{path}: is not a VTK file of its ending: {error}") from error
+    finally:
+        vtkObject.SetGlobalWarningDisplay(shown)
+    if code or mesh is None or not mesh.n_points:
+        raise InputError(f"{path}: is not a VTK file of its ending, is damaged, or holds no points")
+    return mesh
+
+
+def _solid(mesh: Any) -> np.ndarray:
+    """Return which cells have a volume."""
+    import pyvista
+
+    if isinstance(mesh, pyvista.ImageData):
+        return np.full(mesh.n_cells, min(mesh.dimensions) > 1 and bool(len(mesh.cell_data)))
+    if not isinstance(mesh, pyvista.UnstructuredGrid):
+        return np.zeros(mesh.n_cells, dtype=bool)
+    flat = {
+        int(getattr(pyvista.CellType, name))
+        for name in (
+            "EMPTY_CELL", "VERTEX", "POLY_VERTEX", "LINE", "POLY_LINE", "TRIANGLE",
+            "TRIANGLE_STRIP", "POLYGON", "PIXEL", "QUAD",
+        )
+    }  # fmt: skip
+    return ~np.isin(mesh.celltypes, list(flat))
+
+
+def _values(data: Any, rows: int, keep: np.ndarray) -> dict[str, np.ndarray]:
+    columns: dict[str, np.ndarray] = {}
+    for name in data:
+        if name != "vtkGhostType" and not name.startswith("vtkOriginal"):
+            columns |= flattened(name, np.asarray(data[name]), rows)
+    return {name: values[keep] for name, values in columns.items()}
+
+
+def _meta(mesh: Any) -> Meta:
+    return {
+        name: str(np.asarray(mesh.field_data[name]).ravel()[0])
+        for name in _META
+        if name in mesh.field_data and np.asarray(mesh.field_data[name]).size
+    }
+
+
+def _save(mesh: Any, path: Path, meta: Meta) -> None:
+    for name in _META:
+        if name in meta:
+            add_text(mesh.GetFieldData(), name, [meta[name]])
+    mesh.save(path, binary=True)

@@ -363,8 +363,10 @@ def test_columns_by_other_names() -> None:
     assert holes.samples()["Cu_pct"].tolist() == [1.0, 4.0]
     with pytest.raises(InputError, match=r"several columns.*RL, Elevation.*z=RL"):
         read_drillholes(collar.assign(Elevation=0.0), survey, assay, columns={"dip": "INCL"})
+    with pytest.raises(OptionError, match=r"no column 'DEEP' for at in the survey table"):
+        read_drillholes(collar, survey, assay, columns={"dip": "INCL", "at": "DEEP"})
     with pytest.raises(OptionError, match="no field 'inclination'"):
-        read_drillholes(collar, survey, assay, columns={"inclination": "INCL"})
+        read_drillholes(collar, survey, assay, columns={"inclination": "INCL", "dip": "INCL"})
 
 
 def test_grades_that_are_no_numbers_are_not_zero() -> None:
@@ -439,6 +441,8 @@ def test_composite_options_are_checked() -> None:
     for bad in (0.0, -1.0, np.nan):
         with pytest.raises(OptionError, match="composite length"):
             holes.samples(bad)
+    with pytest.raises(OptionError, match="too many"):
+        holes.samples(1e-9)
     with pytest.raises(OptionError, match="residual"):
         holes.samples(1.0, residual="guess")  # type: ignore[arg-type]
     with pytest.raises(OptionError, match="min_coverage"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -277,7 +278,7 @@ def test_surfaces_by_gocad(name: str, tmp_path: Path) -> None:
 
 def test_gocad_properties_depths_and_atoms(tmp_path: Path) -> None:
     (tmp_path / "v.vs").write_text(
-        "GOCAD VSet 1\nHEADER {\nname: PVRTX 1 2\n}\nGOCAD_ORIGINAL_COORDINATE_SYSTEM\n"
+        "GOCAD VSet 1\nHEADER {\nname: PVRTX 1 2, O'Brien's\n}\nGOCAD_ORIGINAL_COORDINATE_SYSTEM\n"
         'NAME "UTM 11"\n'
         'PROJECTION Unknown\nDATUM "NAD 27"\nAXIS_UNIT "ft" "ft" "ft"\nZPOSITIVE Depth\n'
         'END_ORIGINAL_COORDINATE_SYSTEM\nPROPERTIES Cu "dip vector"\nESIZES 1 2\n'
@@ -469,6 +470,29 @@ def test_several_objects_of_different_systems(tmp_path: Path) -> None:
         read_points(tmp_path / "p.vs")
     (tmp_path / "p.vs").write_text(one.format(u="m") * 2)
     assert len(read_points(tmp_path / "p.vs")) == 2
+
+
+@pytest.mark.parametrize("kind", [".vtu", ".vtp", ".gslib", ".vs", ".omf", ".ply", ".dxf"])
+def test_a_full_disk_is_an_error(kind: str, tmp_path: Path) -> None:
+    needs(kind)
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("there is no /dev/full on this system")
+    path = tmp_path / f"f{kind}"
+    path.symlink_to(full)
+    write: Callable[[], None] = partial(write_table, path, points_frame(), columns=("x", "y", "z"))
+    if kind in (".ply", ".dxf"):
+        write = partial(write_surface, path, tetrahedron())
+    with pytest.raises(OSError, match="No space left"):
+        write()
+
+
+def test_columns_that_are_called_alike_are_both_kept(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("x,y,z,au,au\n1,2,3,4,5\n")
+    for kind in (".vtu", ".gslib", ".vs"):
+        read_points(tmp_path / "p.csv").write(tmp_path / f"p{kind}", {})
+        again = read_points(tmp_path / f"p{kind}")
+        assert (again.numbers("au")[0], again.numbers("au_2")[0]) == (4.0, 5.0)
 
 
 # ---------------------------------------------------------------------------- the command line

@@ -13,6 +13,7 @@ from geounfold.mesh import Floats, Ints
 Residual = Literal["merge", "drop", "keep"]
 RESIDUALS = get_args(Residual)
 
+_MOST_PARTS = 5e7  # of intervals, cut by windows
 _SLIVER = 1e-9  # of the composite length: shorter overlaps come from rounding
 
 
@@ -99,6 +100,11 @@ def composite(
         Text columns; empty where missing.
     options : CompositeOptions
         Length and rules.
+
+    Raises
+    ------
+    OptionError
+        So short a length that there are over 50 million.
     """
     window, interval, weight, lower = _parts(hole, start, end, options)
     keys, group = np.unique(np.column_stack([hole[interval], window]), axis=0, return_inverse=True)
@@ -135,6 +141,8 @@ def _parts(
 ) -> tuple[Ints, Ints, Floats, Floats]:
     """Return the parts that windows cut intervals into: window, interval, length and lower end."""
     size = options.length
+    if ((end - start) / size).sum() > _MOST_PARTS:
+        raise OptionError(f"composites of {size:g} are too many to hold; take a greater length")
     low = np.floor(start / size).astype(np.int64)
     high = np.maximum(np.ceil(end / size).astype(np.int64), low + 1)
     interval = np.repeat(np.arange(len(start)), high - low)

@@ -295,11 +295,11 @@ def read_drillholes(
     """
     log = Log()
     names = dict(columns or {})
-    check_fields(names)
     tables = {
         kind: read_hole_table(kind, given, names, log)
         for kind, given in (("collar", collar), ("survey", survey), ("assay", assay))
     }
+    check_fields(names, tables)
     good, with_assays = checks.checked_intervals(tables["assay"], log)
     assayed = {str(name) for name in with_assays}
     collars = checks.checked_collars(tables["collar"], assayed, log)

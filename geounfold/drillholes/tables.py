@@ -13,7 +13,7 @@ from geounfold.drillholes.findings import WARNING, Log
 from geounfold.errors import InputError, OptionError
 from geounfold.io._text import listing, shown
 from geounfold.io.coordinates import LARGEST_COORDINATE, plain_name, readable_numbers
-from geounfold.io.tables import Table, objects, read_table
+from geounfold.io.tables import Table, objects, read_table, unique_names
 from geounfold.mesh import Bools, Floats, Ints
 
 HOLE = "hole"
@@ -69,9 +69,11 @@ class HoleTable:
     numbers : dict of (n,) float
         By field; NaN where missing or no number.
     rest : DataFrame, n rows
-        All other columns as they are.
+        All other columns as they are, numbered where two are called alike.
     row : (n,) int
         Data rows in the file, 1 for the first.
+    names : tuple of str
+        All columns.
     """
 
     source: str
@@ -79,6 +81,7 @@ class HoleTable:
     numbers: Mapping[str, Floats]
     rest: pd.DataFrame
     row: Ints
+    names: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.hole)
@@ -93,6 +96,7 @@ class HoleTable:
             {name: v[keep] for name, v in self.numbers.items()},
             self.rest.loc[keep].reset_index(drop=True),
             self.row[keep],
+            self.names,
         )
 
 
@@ -142,8 +146,8 @@ def read_hole_table(
                 hole=str(hole[i]), row=int(row[i]), detail=f"'{shown(column.iloc[i])}'",
             )  # fmt: skip
     rest = table.frame.iloc[:, [i for i in range(len(names)) if i not in where.values()]]
-    rest = rest.set_axis(pd.Index([str(n) for n in rest.columns], dtype=object), axis=1)
-    whole = HoleTable(source, hole, values, rest, row)
+    rest = rest.set_axis(pd.Index(unique_names(rest.columns), dtype=object), axis=1)
+    whole = HoleTable(source, hole, values, rest, row, tuple(names))
     named = hole != ""
     for i in np.flatnonzero(~named):
         log.add(source, "no hole named", WARNING, "left out", row=int(row[i]))
@@ -180,14 +184,18 @@ def _fields(kind: str, names: list[str], columns: Mapping[str, str], source: str
     return where
 
 
-def check_fields(columns: Mapping[str, str]) -> None:
-    """Raise OptionError where a field is named that none of the tables has."""
-    known = sorted({field for fields in ALIASES.values() for field in fields})
-    for field in columns:
-        if field not in known:
+def check_fields(columns: Mapping[str, str], tables: Mapping[str, HoleTable]) -> None:
+    """Raise OptionError where a field is named that no table has, or a column that is not there."""
+    for field, name in columns.items():
+        homes = [kind for kind, fields in ALIASES.items() if field in fields]
+        if not homes:
+            known = sorted({f for fields in ALIASES.values() for f in fields})
             raise OptionError(
                 f"drill-hole tables have no field '{shown(field)}'; fields: {listing(known)}"
             )
+        if not any(name in tables[kind].names for kind in homes):
+            where = " or ".join(tables[kind].source for kind in homes)
+            raise OptionError(f"no column '{shown(name)}' for {field} in {where}")
 
 
 def _hole_names(column: pd.Series) -> np.ndarray:
@@ -223,7 +231,7 @@ def grade_columns(
     """
     names = [str(name) for name in table.rest.columns]
     for name in chosen or ():
-        if names.count(name) != 1:
+        if name not in names:
             raise OptionError(
                 f"{table.source}: no column '{shown(name)}' for grades; it has: {listing(names)}"
             )

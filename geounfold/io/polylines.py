@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geounfold.io.formats.vtk import add_text
+from geounfold.io.formats.vtk import add_text, save
 from geounfold.mesh import Floats, Ints
 
 
@@ -45,4 +45,4 @@ def write_polylines(
         mesh.point_data[name] = values
     for name, words in line_data.items():
         add_text(mesh.GetCellData(), name, words)
-    mesh.save(path, binary=True)
+    save(mesh, Path(path))

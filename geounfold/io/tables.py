@@ -13,7 +13,7 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import chain
@@ -276,6 +276,26 @@ def objects(column: pd.Series) -> np.ndarray:
     if missing.any():
         values[missing] = ""
     return values
+
+
+def unique_names(names: Iterable[object]) -> list[str]:
+    """Return names as text, numbered where they are there already.
+
+    Examples
+    --------
+    >>> unique_names(["au", "cu", "au"])
+    ['au', 'cu', 'au_2']
+    """
+    made: list[str] = []
+    taken: set[str] = set()
+    for name in map(str, names):
+        number, unique = 1, name
+        while unique in taken:
+            number += 1
+            unique = f"{name}_{number}"
+        taken.add(unique)
+        made.append(unique)
+    return made
 
 
 def with_columns(frame: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:

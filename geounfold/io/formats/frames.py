@@ -8,7 +8,7 @@ import pandas as pd
 from geounfold.errors import OutputError
 from geounfold.io._text import shown
 from geounfold.io.formats.registry import Meta, Points
-from geounfold.io.tables import objects
+from geounfold.io.tables import objects, unique_names
 from geounfold.mesh import Floats
 
 _AXES = ("x", "y", "z")
@@ -32,11 +32,9 @@ def to_frame(points: Points) -> pd.DataFrame:
 
 def to_points(frame: pd.DataFrame, xyz: Floats, columns: tuple[str, ...], meta: Meta) -> Points:
     """Return a table's rows as points; `columns` name the coordinates that `xyz` holds."""
-    values = {
-        str(name): typed_values(frame.iloc[:, i])
-        for i, name in enumerate(frame.columns)
-        if str(name) not in columns
-    }
+    others = [i for i, name in enumerate(frame.columns) if str(name) not in columns]
+    names = unique_names(frame.columns[i] for i in others)
+    values = {name: typed_values(frame.iloc[:, i]) for name, i in zip(names, others, strict=True)}
     return Points(np.asarray(xyz, dtype=np.float64), values, meta)
 
 

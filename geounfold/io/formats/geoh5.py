@@ -10,6 +10,8 @@ brings it from Python 3.12 on.
 
 from __future__ import annotations
 
+import errno
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -120,12 +122,16 @@ def _created(path: Path, meta: Meta) -> Iterator[tuple[Any, Any]]:
     """Yield a new workspace and the library's objects."""
     library, objects = _library()
     unit = meta.get("unit", "m")
-    with (
-        warnings.catch_warnings(),
-        library.Workspace.create(path, distance_unit=_WORDS.get(unit, unit)) as workspace,
-    ):
-        warnings.simplefilter("ignore")
-        yield workspace, objects
+    try:
+        with (
+            warnings.catch_warnings(),
+            library.Workspace.create(path, distance_unit=_WORDS.get(unit, unit)) as workspace,
+        ):
+            warnings.simplefilter("ignore")
+            yield workspace, objects
+    except RuntimeError as error:  # what HDF5 makes of a full disk, among others
+        code = errno.ENOSPC if os.strerror(errno.ENOSPC) in str(error) else errno.EIO
+        raise OSError(code, os.strerror(code), str(path)) from error
 
 
 def _one(path: Path, workspace: Any, kind: Any) -> Any:

@@ -7,7 +7,7 @@ bit for bit.
 
 from __future__ import annotations
 
-import shlex
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -122,6 +122,11 @@ def _quoted(text: str, *, always: bool = False) -> str:
     return f'"{plain}"' if always or " " in plain or not plain else plain
 
 
+def _words(line: str) -> list[str]:
+    """Return a line's words, of which double quotes may hold several."""
+    return [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|(\S+)', line)]
+
+
 def _read(path: Path) -> list[_Object]:
     """Return the objects of a file that have vertices."""
     try:
@@ -173,7 +178,7 @@ def _take(o: _Object, words: list[str], line: str) -> None:
         a, b, c = (o.number[int(v)] for v in rest[:3])
         o.triangles.append((a, b, c))
     elif word == "PROPERTIES":
-        o.names = shlex.split(line)[1:]
+        o.names = _words(line)[1:]
     elif word == "ESIZES":
         o.sizes = [int(v) for v in rest]
     elif word == "NO_DATA_VALUES":
@@ -181,10 +186,10 @@ def _take(o: _Object, words: list[str], line: str) -> None:
     elif word == "ZPOSITIVE":
         o.up = -1.0 if rest[0].lower() == "depth" else 1.0
     elif word == "AXIS_UNIT":
-        units = {unit_name(u) for u in shlex.split(line)[1:]}
+        units = {unit_name(u) for u in _words(line)[1:]}
         o.meta |= {"unit": units.pop()} if len(units) == 1 else {"unit": " ".join(sorted(units))}
     elif word in ("NAME", "PROJECTION", "DATUM"):
-        text = " ".join(shlex.split(line)[1:])
+        text = " ".join(_words(line)[1:])
         if text.lower() not in _NO_NAME:
             o.meta["crs"] = " ".join(filter(None, [o.meta.get("crs"), text]))
 

@@ -17,6 +17,7 @@ from geounfold.errors import InputError
 from geounfold.io._text import shown
 from geounfold.io.formats.frames import coded, missing_code, typed_values
 from geounfold.io.formats.registry import Meta
+from geounfold.io.tables import unique_names
 
 _MISSING = re.compile(r"missing values are (\S+)")
 _MOST_COLUMNS = 10_000
@@ -58,7 +59,7 @@ def read_frame(path: Path) -> pd.DataFrame:
     said = _MISSING.search(lines[0])
     if said:
         values[values == float(said.group(1))] = np.nan
-    return pd.DataFrame(dict(zip(_unique(names), values.T, strict=True)))
+    return pd.DataFrame(dict(zip(unique_names(names), values.T, strict=True)))
 
 
 def _first_word(rows: list[tuple[int, list[str]]]) -> str:
@@ -72,28 +73,11 @@ def _first_word(rows: list[tuple[int, list[str]]]) -> str:
     return "a value is no number"
 
 
-def _unique(names: list[str]) -> list[str]:
-    """Return names, numbered where they are there already.
-
-    Examples
-    --------
-    >>> _unique(["au", "cu", "au"])
-    ['au', 'cu', 'au_2']
-    """
-    made: list[str] = []
-    for name in names:
-        number = 1
-        while (unique := name if number == 1 else f"{name}_{number}") in made:
-            number += 1
-        made.append(unique)
-    return made
-
-
 def write_frame(path: Path, frame: pd.DataFrame, meta: Meta) -> None:
     """Write columns of numbers as they are, texts as codes that the title names."""
     made = {
-        str(name): coded(str(name), typed_values(frame.iloc[:, i]), "GSLIB")
-        for i, name in enumerate(frame.columns)
+        name: coded(name, typed_values(frame.iloc[:, i]), "GSLIB")
+        for i, name in enumerate(unique_names(frame.columns))
     }
     columns = [values for values, _ in made.values()]
     code = missing_code(columns)

@@ -6,7 +6,10 @@ called ``unit`` and ``crs``, as VTK has no place of its own for them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import errno
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +40,7 @@ def read_points(path: Path) -> Points:
     data = mesh.point_data
     points = np.asarray(mesh.points, dtype=np.float64)
     # One vertex cell for each point, as we write them, may carry the values instead.
-    if mesh.n_cells == mesh.n_points and not len(data) and len(mesh.cell_data):
+    if not len(data) and len(mesh.cell_data) and _is_cloud(mesh):
         data, points = mesh.cell_data, np.asarray(mesh.cell_centers().points, dtype=np.float64)
     return Points(points, _values(data, mesh.n_points, keep), _meta(mesh))
 
@@ -89,21 +92,30 @@ def add_text(data: Any, name: str, words: Iterable[str]) -> None:
     data.AddArray(array)
 
 
-def _read(path: Path) -> Any:
-    import pyvista
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep from stderr what VTK's error codes tell as well."""
     from vtkmodules.vtkCommonCore import vtkObject
 
-    # VTK says what is wrong on stderr; its readers' error code tells it too.
     shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()
     try:
-        reader = pyvista.get_reader(path)
-        mesh = reader.read()
-        code = reader.reader.GetErrorCode()
-    except (ValueError, TypeError, RuntimeError, OSError, AttributeError) as error:
-        raise InputError(f"{path}: is not a VTK file of its ending: {error}") from error
+        yield
     finally:
         vtkObject.SetGlobalWarningDisplay(shown)
+
+
+def _read(path: Path) -> Any:
+    import pyvista
+
+    try:
+        with _quiet():
+            reader = pyvista.get_reader(path)
+            mesh = reader.read()
+            code = reader.reader.GetErrorCode()
+    except (ValueError, TypeError, RuntimeError, OSError, AttributeError) as error:
+        words = " ".join(str(error).split())
+        raise InputError(f"{path}: is not a VTK file of its ending: {words}") from error
     if code or mesh is None or not mesh.n_points:
         raise InputError(f"{path}: is not a VTK file of its ending, is damaged, or holds no points")
     return mesh
@@ -127,6 +139,19 @@ def _solid(mesh: Any) -> np.ndarray:
     return ~np.isin(mesh.celltypes, list(flat))
 
 
+def _is_cloud(mesh: Any) -> bool:
+    """Return whether there is one vertex cell for each point and nothing else."""
+    import pyvista
+
+    if mesh.n_cells != mesh.n_points:
+        return False
+    if isinstance(mesh, pyvista.PolyData):
+        return bool(mesh.n_verts == mesh.n_points)
+    return isinstance(mesh, pyvista.UnstructuredGrid) and bool(
+        (mesh.celltypes == int(pyvista.CellType.VERTEX)).all()
+    )
+
+
 def _values(data: Any, rows: int, keep: np.ndarray) -> dict[str, np.ndarray]:
     columns: dict[str, np.ndarray] = {}
     for name in data:
@@ -147,4 +172,28 @@ def _save(mesh: Any, path: Path, meta: Meta) -> None:
     for name in _META:
         if name in meta:
             add_text(mesh.GetFieldData(), name, [meta[name]])
-    mesh.save(path, binary=True)
+    save(mesh, path)
+
+
+def save(mesh: Any, path: Path) -> None:
+    """Write poly data (.vtp) or an unstructured grid (.vtu).
+
+    pyvista's own `save` does not look at what the writer says: on a full disk it leaves half a
+    file and goes on.
+
+    Raises
+    ------
+    OSError
+        The file could not be written whole.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    kinds = {".vtp": vtkXMLPolyDataWriter, ".vtu": vtkXMLUnstructuredGridWriter}
+    writer = kinds[path.suffix.lower()]()
+    writer.SetFileName(str(path))
+    writer.SetInputData(mesh)
+    with _quiet():
+        written = writer.Write()
+    if not written or writer.GetErrorCode():
+        code = int(writer.GetErrorCode()) or errno.EIO
+        raise OSError(code, os.strerror(code), str(path))

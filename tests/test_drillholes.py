@@ -580,7 +580,11 @@ def test_samples_and_traces_go_with_the_body(
     np.testing.assert_allclose(lines.point_data["unfolded"], image, rtol=0, atol=1e-9)
     summary = json.loads((folder / "s.json").read_text())
     assert summary["drillholes"]["holes"] == len(samples)
-    assert summary["drillholes"]["samples"] == {"points": len(samples), "extrapolated": 0}
+    assert summary["drillholes"]["samples"] == {
+        "points": len(samples),
+        "extrapolated": 0,
+        "outside": 0,
+    }
     assert any("no dip is positive" in line for line in summary["warnings"])
 
     # The saved map carries them alike, and traces as a table have both spaces.

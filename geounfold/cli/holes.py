@@ -56,6 +56,7 @@ class HoleData:
             name: {
                 "points": len(columns["location"]),
                 "extrapolated": int(np.count_nonzero(columns["location"] == "extrapolated")),
+                "outside": int(np.count_nonzero(columns["location"] == "outside")),
             }
             for name, columns in results.items()
         }

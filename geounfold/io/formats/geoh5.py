@@ -1,7 +1,8 @@
 """geoh5, the open format of Geoscience ANALYST, through geoh5py (extra ``formats``).
 
 One object of a workspace is read: points, else a block model's cells; or a surface. The object's
-coordinate reference and the workspace's unit are carried. Floats come back bit for bit, whole
+coordinate reference and the workspace's unit are carried; a workspace must have a unit, so one
+written without any says metres, as the library's own do. Floats come back bit for bit, whole
 numbers beyond 32 bits as floats.
 
 geoh5py asks for NumPy below 2 on Python 3.11, which geounfold does not work with: the extra

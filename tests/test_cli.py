@@ -28,7 +28,8 @@ from geounfold.mesh import TetMesh
 
 COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
-RESULTS = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic", "location"]
+PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
+RESULTS = [*PLACE, "location", "mesh_distance"]
 
 
 class FakeMap:
@@ -37,7 +38,12 @@ class FakeMap:
     def carry(self, points: np.ndarray, *, inverse: bool = False) -> SimpleNamespace:
         location = np.where(points[:, 0] < 0, "extrapolated", "inside")
         image = points - SHIFT if inverse else points + SHIFT
-        return SimpleNamespace(points=image, stratigraphic=points[:, 2] / 10, location=location)
+        return SimpleNamespace(
+            points=image,
+            stratigraphic=points[:, 2] / 10,
+            location=location,
+            distance=np.maximum(-points[:, 0], 0),
+        )
 
 
 class FakeUnfolding(FakeMap):
@@ -167,21 +173,21 @@ def test_unfold_writes_everything(
         *("p.csv", "q.csv", "out.csv", "s.json", "m.npz", "r.html", "qo.csv")
     }
     assert (tmp_path / "out.csv").read_text().splitlines() == [
-        "id,XC,YC,ZC,location,unfolded_x,unfolded_y,unfolded_z,stratigraphic,volume_ratio",
-        "007,1.50,2,3,inside,1001.5,2.0,-2.0,0.3,1.0",
-        ",-4,5,6,extrapolated,996.0,5.0,1.0,0.6,1.0",
-        "9,7,8,9,inside,1007.0,8.0,4.0,0.9,1.0",
+        "id,XC,YC,ZC,location,unfolded_x,unfolded_y,unfolded_z,stratigraphic,mesh_distance,volume_ratio",
+        "007,1.50,2,3,inside,1001.5,2.0,-2.0,0.3,0.0,1.0",
+        ",-4,5,6,extrapolated,996.0,5.0,1.0,0.6,4.0,1.0",
+        "9,7,8,9,inside,1007.0,8.0,4.0,0.9,0.0,1.0",
     ]
     assert (tmp_path / "qo.csv").read_text().splitlines() == [
         "hole,x,y,z," + ",".join(RESULTS),
-        "a,1,1,1,1001.0,1.0,-4.0,0.1,inside",
+        "a,1,1,1,1001.0,1.0,-4.0,0.1,inside,0.0",
     ]
     summary = json.loads((tmp_path / "s.json").read_text())
     assert summary["nmd"] is None
     assert summary["input"]["columns"] == ["XC", "YC", "ZC"]
     assert summary["input"]["rows"] == 3
     assert seen["summary"]["points"] == 3
-    assert list(seen["columns"])[:5] == RESULTS
+    assert list(seen["columns"])[:6] == RESULTS
     np.testing.assert_array_equal(seen["unfolded"], seen["folded"] + SHIFT)
 
 
@@ -260,7 +266,7 @@ def test_map_there_and_back(
     (tmp_path / "m.npz").write_bytes(b"map")
     assert main(["map", "m.npz", "p.csv", "-o", "flat.csv"]) == 0
     flat = pd.read_csv(tmp_path / "flat.csv", dtype=str)
-    assert list(flat) == ["id", "XC", "YC", "ZC", "location", *RESULTS[:4]]
+    assert list(flat) == ["id", "XC", "YC", "ZC", "location", *PLACE, "mesh_distance"]
     assert "p.csv: 1 of 3 points lie outside the control mesh" in capsys.readouterr().err
     columns = "unfolded_x,unfolded_y,unfolded_z"
     assert main(f"map m.npz flat.csv --inverse --columns {columns} -o back.csv".split()) == 0

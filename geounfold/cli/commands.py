@@ -203,10 +203,9 @@ def _flat(saved: UnfoldingMap) -> Callable[[Floats], dict[str, Any]]:
 
 def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:
     """Say how many carried points the control mesh does not hold."""
-    from geounfold.mapping import EXTRAPOLATED, OUTSIDE
-
     location = columns["location"]
-    extrapolated, empty = (int(np.count_nonzero(location == w)) for w in (EXTRAPOLATED, OUTSIDE))
+    words = ("extrapolated", "outside")
+    extrapolated, empty = (int(np.count_nonzero(location == word)) for word in words)
     if extrapolated:
         console.warn(
             f"{path}: {extrapolated} of {len(location)} points lie outside the control mesh and "

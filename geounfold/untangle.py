@@ -57,8 +57,11 @@ def untangle(V: Floats, T: Ints, rest: Floats, bad: Ints) -> Floats:
             free[T[free[T].any(axis=1)]] = True
         done = rings
         near = free[T].any(axis=1)
-        problem = _Problem(V, T[near], inverse[near], np.flatnonzero(free))
-        out, upright = problem.solve()
+        used, local = np.unique(T[near], return_inverse=True)
+        problem = _Problem(V[used], local.reshape(-1, 4), inverse[near], np.flatnonzero(free[used]))
+        places, upright = problem.solve()
+        out = V.copy()
+        out[used] = places
         if upright:
             break
     return out
@@ -130,7 +133,9 @@ class _Problem:
         )
         gradient_K = 2 * power[:, None, None] * K + along[:, None, None] * cofactor
         edges = self.inverse.transpose(0, 2, 1) @ gradient_K
-        out = np.zeros_like(self.V)
-        np.add.at(out, self.T[:, 1:], edges)
-        np.add.at(out, self.T[:, 0], -edges.sum(axis=1))
-        return energy, out[self.free].ravel()
+        corners = np.concatenate([-edges.sum(axis=1)[:, None], edges], axis=1)
+        pull = [
+            np.bincount(self.T.ravel(), c.ravel(), len(self.V)) for c in corners.T.swapaxes(1, 2)
+        ]
+        gradient: Floats = np.stack(pull, axis=1).astype(np.float64)
+        return energy, gradient[self.free].ravel()

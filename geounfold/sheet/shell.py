@@ -18,7 +18,7 @@ from geounfold.prisms import prism_tets
 from geounfold.sheet.layers import Layers, bounded_slope
 from geounfold.sheet.normal import graph_laplacian, spd_solver
 
-_LEAST = 0.05  # share of the reach below which a node gets no shell
+_LEAST = 0.2  # share of the reach below which a node gets no shell
 _SHARE = 0.45  # of the way to another limb that a limb's shell may take
 _FOCAL = 0.95  # of the focal distance that the shell may reach
 _SLOPE = 0.6  # largest change of the shell's height along the sheet

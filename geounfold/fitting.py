@@ -250,16 +250,7 @@ def _turned_over(result: BodyFit) -> BodyFit:
     notes = dict(result.notes)
     if "layers_follow" in notes:
         notes["layers_follow"] = _OTHER_SIDE.get(str(notes["layers_follow"]), "mid")
-    turned = SurfaceSplit(
-        parts.mesh,
-        -parts.side,
-        parts.rim,
-        parts.opposite,
-        parts.thickness,
-        parts.median_thickness,
-        parts.adjacency,
-        not parts.flipped_up,
-    )
+    turned = replace(parts, side=-parts.side, flipped_up=not parts.flipped_up)
     return BodyFit(
         result.hull,
         turned,

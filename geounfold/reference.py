@@ -43,7 +43,8 @@ def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
     median = float(np.median(distance[seen]))
     adjacency = triangle_adjacency(F)
     rim = ~seen | (distance > 2 * median) | (adjacency < 0).any(axis=1)
-    return SurfaceSplit(TriMesh(V, F), side, rim, hit, distance, median, adjacency, False)
+    beyond = np.zeros(len(F), dtype=bool)
+    return SurfaceSplit(TriMesh(V, F), side, rim, hit, distance, median, adjacency, False, beyond)
 
 
 def _resampled(mesh: TriMesh) -> TriMesh:

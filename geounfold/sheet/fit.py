@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from geounfold.errors import SplitError
 from geounfold.geometry import unit
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.sheet.medial import MedialSheet
@@ -25,8 +26,9 @@ class FitOptions:
     ``knots``: spline knot spacing; ``cell``: spacing of the searched sampling; ``smooth``:
     length below which the mid surface is smoothed, on smooth hulls and (times ``rough``)
     on staircases, by residuals between ``quiet`` and ``loud``; ``smooth_half``: the same for
-    the half thickness; ``weak``: weight of medial points off the core; ``rounds``: growth
-    rounds; ``agree``: least cosine between a sample's normal and the predicted one;
+    the half thickness; ``weak``: weight of medial points off the core; ``unseen``: weight of
+    curvature, felt where no sample tells it, across a narrow strip; ``rounds``: growth rounds;
+    ``agree``: least cosine between a sample's normal and the predicted one;
     ``first``/``later``: largest thickness misfit of an accepted sample in round one and
     after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
     accepted samples the sheet is searched.
@@ -40,8 +42,9 @@ class FitOptions:
     loud: float = 0.08
     smooth_half: float = 3.0
     weak: float = 1e-4
+    unseen: float = 3e-4
     rounds: int = 4
-    agree: float = 0.92
+    agree: float = 0.95
     first: float = 1.5
     later: float = 1.0
     erosion: float = 1.5
@@ -119,9 +122,11 @@ class _System:
     bending: Stencils
     third: Stencils
     half_weight: float
+    unseen: float
 
-    def surface_weight(self, length: float) -> float:
-        return (length / self.grid.step) ** 6
+    def stiffness(self, length: float) -> Stencils:
+        """Return the surface's energy: curvature continues, and is none where nothing says so."""
+        return (length / self.grid.step) ** 6 * self.third + self.unseen * self.bending
 
 
 def _start(
@@ -132,13 +137,11 @@ def _start(
     low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
     grid = SplineGrid.over(low, high, options.knots)
     half_weight = (options.smooth_half / options.knots) ** 4
-    system = _System(grid, grid.energy(2), grid.energy(3), half_weight)
+    system = _System(grid, grid.energy(2), grid.energy(3), half_weight, options.unseen)
     w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
     B = grid.basis(medial.uv)
     BtWB = grid.gram(B, w)
-    C = (BtWB + system.surface_weight(options.smooth) * system.third).solver(RIDGE)(
-        B.T @ (w[:, None] * medial.mesh.V)
-    )
+    C = (BtWB + system.stiffness(options.smooth)).solver(RIDGE)(B.T @ (w[:, None] * medial.mesh.V))
     half = (BtWB + half_weight * system.bending).solver(RIDGE)(B.T @ (w * medial.half))
     return system, Sheet(grid, C, low, high, options.cell), half
 
@@ -171,7 +174,10 @@ def _accept(
     misfit: float,
     options: FitOptions,
 ) -> _Accepted:
-    """Return which samples agree with the sheet so far, by normal and by thickness."""
+    """Return which samples agree with the sheet so far, by normal and by thickness.
+
+    The distance kept from those that do not is reduced where it would cost most of a strip.
+    """
     side = np.sign(np.einsum("ij,ij->i", samples.normals, foot.normal))
     height = unbiased_heights(sheet, foot, side, samples)
     flat = foot.U if slip is None else foot.U - foot.t[:, None] * sheet.grid.value(slip, foot.U)
@@ -182,8 +188,13 @@ def _accept(
     good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
     good &= side * samples.side >= 0  # else the sheet has run into another limb
     true_foot = foot.miss < 0.1
-    rejected = near_any(samples.points, ~good & true_foot, options.erosion)
-    return _Accepted(foot, height, side, flat, good & true_foot & ~rejected)
+    good &= true_foot
+    wrong = ~good & true_foot
+    for erosion in (options.erosion, options.erosion / 2, 0.0):
+        keep = good & ~near_any(samples.points, wrong, erosion)
+        if 2 * keep.sum() > good.sum():
+            break
+    return _Accepted(foot, height, side, flat, keep)
 
 
 def _side_weights(accepted: _Accepted, cell: float) -> Floats:
@@ -210,7 +221,7 @@ def _refit(
     w = _side_weights(accepted, options.knots)
     B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
     BtWB = system.grid.gram(B, w)
-    surface = BtWB + system.surface_weight(smoothing) * system.third
+    surface = BtWB + system.stiffness(smoothing)
     thickness = system.grid.gram(H, w) + system.half_weight * system.bending
     cross = B.T @ H.multiply((w * s)[:, None]).tocsr()
     solve = coupled_solver(surface, thickness, cross, RIDGE)
@@ -222,9 +233,7 @@ def _refit(
     stretch = np.interp(roughness, [options.quiet, options.loud], [1.0, options.rough])
     smoothing = options.smooth * float(stretch)
     points = sheet.at(U) + mid[:, None] * accepted.foot.normal[keep]
-    C = (BtWB + system.surface_weight(smoothing) * system.third).solver(RIDGE)(
-        B.T @ (w[:, None] * points)
-    )
+    C = (BtWB + system.stiffness(smoothing)).solver(RIDGE)(B.T @ (w[:, None] * points))
     return sheet.with_coefficients(C), half, w, roughness, smoothing
 
 
@@ -243,6 +252,11 @@ def fit_sheet(
         The blocks, which set how far the sheet must reach.
     options : FitOptions
         See there.
+
+    Raises
+    ------
+    SplitError
+        No sample agrees with the sheet.
     """
     system, sheet, half = _start(medial, points, options)
     slip: Floats | None = None
@@ -251,6 +265,11 @@ def fit_sheet(
         foot = sheet.search(near, options.reach).feet(samples.points)
         misfit = options.first if turn == 0 else options.later
         accepted = _accept(sheet, half, slip, foot, samples, misfit, options)
+        if not accepted.keep.any():
+            raise SplitError(
+                "no part of the hull agrees with a smooth sheet; try another --hull, or smaller "
+                "blocks where the body is narrow"
+            )
         sheet, half, w, roughness, smoothing = _refit(system, sheet, accepted, smoothing, options)
         near = accepted.foot.U[accepted.keep]
         slip = slip_potential(sheet, near, w, system.bending)

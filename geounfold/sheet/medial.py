@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geounfold.backends.igl import face_components, pinched_vertices
 from geounfold.errors import SplitError
 from geounfold.geometry import (
-    face_normals,
+    bilateral_normals,
     triangle_areas,
     unit,
     vertex_normals,
@@ -21,7 +22,7 @@ from geounfold.geometry import (
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
 from geounfold.sheet.normal import graph_laplacian, spd_solver
 from geounfold.sheet.surface import near_any
-from geounfold.split import SurfaceSplit
+from geounfold.split import THICKEST, SurfaceSplit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,15 +31,22 @@ class MedialOptions:
 
     Lengths in blocks.  ``parallel``: a core face and its opposite face, normals smoothed by
     ``sweeps`` bilateral passes, must satisfy -N.N' > parallel; ``closing``: width closed in
-    that region; ``erosion``: distance kept from the rim; ``domain``: the flattened domain
-    keeps any face farther than this many median thicknesses from the change of side.
+    that region; ``island``: least share of its largest part that another part of it has (the
+    tip of an oblique cut is parallel again, by chance); ``erosion``: distance kept from the rim;
+    ``domain``: the flattened domain
+    keeps any face farther than this many median thicknesses from the change of side;
+    ``fair``: least share of a side that the domain should have;
+    ``prefer``: share by which the bottom must be more complete to be flattened for the top.
     """
 
     parallel: float = 0.94
     sweeps: int = 6
     closing: float = 2.5
+    island: float = 0.05
     erosion: float = 1.5
     domain: float = 1.2
+    fair: float = 0.5
+    prefer: float = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,29 +77,61 @@ class MedialSheet:
     normals: Floats
 
 
-def bilateral_normals(mesh: TriMesh, adjacency: Ints, sweeps: int) -> Floats:
-    """Return face normals smoothed without blunting creases, (m, 3)."""
-    N = face_normals(mesh.V, mesh.F)
-    area = 2 * triangle_areas(mesh.V, mesh.F)
-    own = np.arange(len(mesh.F))[:, None]
-    near = np.where(adjacency >= 0, adjacency, own)
-    for _ in range(sweeps):
-        cos = np.einsum("ijk,ik->ij", N[near], N)
-        weight = np.exp((cos - 1) / 0.12) * area[near]
-        N = unit(N * area[:, None] + np.einsum("ij,ijk->ik", weight, N[near]))
-    return N
+@dataclass(frozen=True, eq=False)
+class _Domain:
+    """Faces of one side, ``top`` or not, that are laid flat; ``share`` of the side's area."""
+
+    faces: Ints
+    top: bool
+    share: float
+
+
+def _regions(
+    split: SurfaceSplit, normals: Floats, centres: Floats, options: MedialOptions
+) -> tuple[Bools, Ints, bool]:
+    """Return the trusted core (m,), the faces that are laid flat, and whether they are the top's.
+
+    A strip has little left away from its rim: the distance kept from it is reduced until the
+    faces are a fair share of their side.
+    """
+    area = triangle_areas(split.mesh.V, split.mesh.F)
+    deep = _far_inside(split, centres, options.domain)
+    for erosion in (options.erosion, options.erosion / 2, 0.0):
+        core, away = _core(split, normals, centres, erosion, options)
+        domain = _domain(split, (away | deep) & ~split.beyond, area, options.prefer)
+        if domain is not None and domain.share > options.fair:
+            return core, domain.faces, domain.top
+    whole = _domain(split, ~split.beyond, area, options.prefer)
+    if domain is None or (whole is not None and whole.share > 2 * domain.share):
+        domain = whole
+    if domain is None:
+        raise SplitError("the split left no top away from the rim; try another --hull")
+    return core, domain.faces, domain.top
 
 
 def _core(
-    split: SurfaceSplit, normals: Floats, centres: Floats, options: MedialOptions
+    split: SurfaceSplit, normals: Floats, centres: Floats, erosion: float, options: MedialOptions
 ) -> tuple[Bools, Bools]:
     """Return the trusted core and the faces away from the rim, (m,) each."""
-    away = ~split.rim & ~near_any(centres, split.rim, options.erosion)
+    away = ~split.rim & ~near_any(centres, split.rim, erosion) if erosion else ~split.rim
     seen = (split.opposite >= 0) & np.isfinite(split.thickness)
     other = normals[np.where(seen, split.opposite, 0)]
     cos = np.where(seen, -np.einsum("ij,ij->i", normals, other), 0.0)
     closed = near_any(centres, away & (cos > options.parallel), options.closing)
-    return away & closed & ~near_any(centres, ~closed, options.closing), away
+    core = away & closed & ~near_any(centres, ~closed, options.closing)
+    return _large_parts(core, split.adjacency, options.island), away
+
+
+def _large_parts(faces: Bools, adjacency: Ints, share: float) -> Bools:
+    """Return faces (m,) without the connected parts of less than a share of the largest's."""
+    n = len(faces)
+    row, column = np.repeat(np.arange(n), 3), adjacency.ravel()
+    links = faces[row] & (column >= 0) & faces[column]
+    graph = sp.coo_array((np.ones(links.sum()), (row[links], column[links])), (n, n))
+    part = connected_components(graph, directed=False)[1]
+    size = np.bincount(part, faces)
+    out: Bools = faces & (size >= share * size.max())[part]
+    return out
 
 
 def _harmonic_half(
@@ -137,20 +177,34 @@ def medial_sheet(
     mesh = split.mesh
     centres = mesh.V[mesh.F].mean(axis=1)
     normals = bilateral_normals(mesh, split.adjacency, options.sweeps)
-    core, away = _core(split, normals, centres, options)
-    top = (split.side > 0) & (away | _far_inside(split, centres, options.domain))
-    if not top.any():
-        raise SplitError("the split left no top away from the rim; try another --hull")
-    faces = _one_sheet(mesh.F, np.flatnonzero(top))
+    core, faces, outward = _regions(split, normals, centres, options)
     part, old = mesh.submesh(faces)
     half, trusted = _harmonic_half(split, part.F, faces, core, len(old))
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
-    medial = TriMesh(part.V - half[:, None] * inward, part.F)
+    medial = TriMesh(part.V - half[:, None] * inward, part.F if outward else part.F[:, ::-1])
     uv = flatten(medial, None)
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
     return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, core, at_vertices)
+
+
+def _domain(split: SurfaceSplit, inside: Bools, area: Floats, prefer: float) -> _Domain | None:
+    """Return the faces inside that are laid flat; None where there are none.
+
+    The top's, unless its largest part leaves out more of it than the bottom's does by some
+    share: at the inside of a tight hinge there is little to see of a side.
+    """
+    found = []
+    for side in (1, -1):
+        mine = split.side == side
+        if (mine & inside).any():
+            faces = _one_sheet(split.mesh.F, np.flatnonzero(mine & inside))
+            share = float(area[faces].sum() / area[mine & ~split.beyond].sum())
+            found.append(_Domain(faces, side > 0, share))
+    if len(found) == 2 and found[1].share > found[0].share + prefer:
+        return found[1]
+    return found[0] if found else None
 
 
 def _one_sheet(F: Ints, faces: Ints) -> Ints:
@@ -169,13 +223,17 @@ def _one_sheet(F: Ints, faces: Ints) -> Ints:
 
 
 def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
-    """Return the faces farther than some median thicknesses from the change of side."""
+    """Return the faces farther than some median thicknesses from the change of side.
+
+    Not those whose ray missed the other side: ends of limbs that meet look along them.
+    """
     near = np.where(split.adjacency >= 0, split.adjacency, np.arange(len(centres))[:, None])
     change = (split.side[near] != split.side[:, None]).any(axis=1)
     if not change.any():
         return np.ones(len(centres), dtype=bool)
     distance = cKDTree(centres[change]).query(centres)[0]
-    return np.asarray(distance > domain * split.median_thickness)
+    near_side = split.thickness <= THICKEST * split.median_thickness
+    return np.asarray(near_side & (distance > domain * split.median_thickness))
 
 
 def _oriented(uv: Floats, V: Floats) -> Floats:

@@ -93,14 +93,8 @@ def register(A: Floats, B: Floats, weight: Floats) -> Floats:
 
 
 def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
-    """Return the feet of all blocks; those past the trimmed sheet are searched on all of it."""
-    foot = fitted.sheet.search(fitted.near, reach).feet(points)
-    missed = foot.miss > 0.05
-    if missed.any():
-        again = fitted.sheet.search().feet(points[missed], newton=3)
-        for mine, theirs in zip(foot, again, strict=True):
-            mine[missed] = theirs
-    return foot
+    """Return the feet of all blocks, each on its own limb (see FittedSheet.own_feet)."""
+    return fitted.own_feet(points, (reach / 5, reach / 2, reach))
 
 
 @dataclass(frozen=True, eq=False)

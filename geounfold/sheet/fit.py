@@ -15,6 +15,9 @@ from geounfold.sheet.normal import Stencils, coupled_solver
 from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Foot, Sheet, blur_shift, near_any, slip_potential
 
+OWN = 0.75
+"""How far past the half thickness a foot is taken to be on the point's own limb, in blocks."""
+
 RIDGE = 1e-9
 """Weight that holds coefficients which nothing else reaches."""
 
@@ -108,6 +111,31 @@ class FittedSheet:
     accepted: float
     lean: float = 0.0
     level: float = 0.0
+
+    def own_feet(self, Q: Floats, reaches: tuple[float, ...]) -> Foot:
+        """Return the feet of points Q (n, 3) of the body on the limb that they belong to.
+
+        Where limbs come close, the nearest point of the sheet may lie where it was continued
+        past its rim into another limb.  So the least continued part of it that has a foot
+        within the half thickness is taken: parts within ``reaches`` (rising) of the samples
+        are tried in turn.  What none of them holds has the foot of the last one, or of the
+        whole sheet.
+        """
+        foot = self.sheet.search(self.near, reaches[0]).feet(Q)
+        for reach in (*reaches[1:], None):
+            half = self.sheet.grid.value(self.half, foot.U)
+            thick = np.where(foot.t >= 0, self.reach(1.0, half), self.reach(-1.0, half))
+            over = np.abs(foot.t) > thick + OWN
+            lost = foot.miss > 0.05
+            rows = np.flatnonzero(lost | over if reach is not None else lost)
+            if not len(rows):
+                break
+            search = self.sheet.search() if reach is None else self.sheet.search(self.near, reach)
+            again = search.feet(Q[rows], newton=2 if reach is not None else 3)
+            better = lost[rows] | ((again.miss <= 0.05) & (np.abs(again.t) < np.abs(foot.t[rows])))
+            for mine, theirs in zip(foot, again, strict=True):
+                mine[rows[better]] = theirs[better]
+        return foot
 
     def reach(self, side: float, half: Floats) -> Floats:
         """Return the distance from the sheet to its top (side 1) or bottom (-1), (n,)."""

@@ -212,7 +212,7 @@ def _has_other_type(column: pd.Series) -> bool:
 
 def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
     """Return numbers where some values are missing or no numbers, and which are the latter."""
-    words = pd.Series(text, dtype=object).astype(str).str.strip()
+    words = pd.Series([str(value).strip() for value in text], dtype=object)
     missing = words.str.casefold().isin(_MISSING).to_numpy()
     good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
     values = np.full(len(words), np.nan)

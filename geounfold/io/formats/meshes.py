@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from geounfold.errors import InputError
+from geounfold.io.formats.meshcheck import checked_vertices
 from geounfold.io.formats.registry import Surface
 
 
@@ -19,12 +21,18 @@ def read_surface(path: Path) -> Surface:
 
     Raises
     ------
-    BackendError
+    BackendError, InputError
         The file is damaged.
     """
     from geounfold.backends import meshlab
 
+    count = checked_vertices(path)
     V, F = meshlab.read_mesh(path)
+    if count is not None and len(V) != count:
+        raise InputError(
+            f"{path}: is not a surface: it tells of {count} vertices, but {len(V)} can be used; "
+            "are all of them finite numbers?"
+        )
     return Surface(V, F)
 
 

@@ -50,14 +50,25 @@ def _ply(content: bytes) -> int:
 
 
 def _off(content: bytes) -> int:
-    words = re.sub(rb"#[^\n]*", b"", content[:4096]).split()
-    counts = words[1:3]
-    if not words or not words[0].upper().endswith(b"OFF") or not all(c.isdigit() for c in counts):
+    rows = [words for line in content.splitlines() if (words := line.partition(b"#")[0].split())]
+    if not rows or not rows[0][0].upper().endswith(b"OFF"):
         raise ValueError("the header of the OFF file is cut, or none")
-    total = sum(map(int, counts))
-    if len(counts) < 2 or total > len(content):
-        raise ValueError(f"the file is cut: it tells of {total} vertices and faces")
-    return int(counts[0])
+    start = 2 if len(rows[0]) == 1 else 1
+    counts = [*rows[0][1:], *(rows[1] if start == 2 and len(rows) > 1 else [])][:2]
+    if len(counts) < 2 or not all(count.isdigit() for count in counts):
+        raise ValueError("the header of the OFF file is cut, or none")
+    vertices, faces = map(int, counts)
+    if len(rows) - start < vertices + faces:
+        raise ValueError(f"the file is cut: it tells of {vertices + faces} vertices and faces")
+    _check_numbers(row[:3] for row in rows[start : start + vertices])
+    for row in rows[start + vertices : start + vertices + faces]:
+        corners = [int(word) for word in row[1 : 1 + int(row[0])]]
+        if len(corners) < int(row[0]) or not all(0 <= k < vertices for k in corners):
+            raise ValueError(
+                f"a face has vertices {shown(corners)}, but vertices are numbered 0 to "
+                f"{vertices - 1}"
+            )
+    return vertices
 
 
 def _stl(content: bytes) -> None:

@@ -145,7 +145,7 @@ def test_upright_prisms_may_overlap_at_an_inner_hinge():
     points = np.ascontiguousarray(u.frame.to_work(body.folded))
     foot = build.block_feet(fit.fitted, points, reach=10.0)
     columns = build._columns(fit.fitted, fit.horizons, foot, None, _laid_flat, options, "mid")
-    caps = build._sloping_caps(columns, options.focal, slope=1e9)
+    caps = build._focal_caps(columns.curvature[:, : columns.count], options.focal)
     layers = columns.layers(build._offsets(columns, foot, caps, options), FRACTIONS)
     V, T = layers.folded, layers.tets()
     assert (tet_volumes(V, T) > 0).all()

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from geounfold.backends.igl import SurfaceIndex
 from geounfold.control import ControlMesh, Datum
 from geounfold.flattening._result import Flattening
 from geounfold.mesh import Floats, TriMesh
@@ -175,6 +176,8 @@ def _safely_flat(
     return result
 
 
+_OFF = 1e-3  # blocks: rays towards other limbs start so far off the walls
+_HALF = 0.45  # of the way to another limb that a limb may take
 _STRAIGHT = 1e-9  # curvature below which a surface has no focal distance to speak of
 
 
@@ -190,15 +193,33 @@ def _offsets(columns: Columns, foot: Foot, caps: Floats, options: ControlOptions
     return np.minimum(np.stack(follow), caps)
 
 
-def _sloping_caps(columns: Columns, focal: float, slope: float) -> Floats:
-    """Return caps (2, n) on the offsets: a share of the focal distance, of bounded slope.
+def _room(columns: Columns, share: float) -> Floats:
+    """Return how far normals may run above and below, (2, n).
+
+    A share of the way to where they meet their neighbours; and, past top and bottom, not quite
+    half of the way to another limb.
+    """
+    P, normal = (a[: columns.count] for a in (columns.P, columns.normal))
+    sides = (columns.high, columns.low)
+    walls = [P + height[:, None] * normal for height in sides]
+    F, n = columns.prints.F, columns.count
+    index = SurfaceIndex(np.concatenate(walls), np.concatenate([F, F + n]))
+    room = _focal_caps(columns.curvature[:, :n], share)
+    for k, (side, wall, height) in enumerate(zip((1.0, -1.0), walls, sides, strict=True)):
+        out = side * normal
+        gap = index.first_hit(wall + _OFF * out, out)[1]
+        room[k] = np.minimum(room[k], side * height + _HALF * gap)
+    return room
+
+
+def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
+    """Return caps (2, n) on the offsets: the room there is, of bounded slope.
 
     At a hinge the mesh's border has to run on nearly parallel to the sheet: where it dips
     towards a focal line and out again, columns cross those two away.
     """
-    F, n = columns.prints.F, columns.count
-    caps = _focal_caps(columns.curvature[:, :n], focal)
-    return np.stack([bounded_slope(cap, columns.prints.U, F, slope) for cap in caps])
+    F, U = columns.prints.F, columns.prints.U
+    return np.stack([bounded_slope(cap, U, F, slope) for cap in _room(columns, share)])
 
 
 def _footprint(sheet: Sheet, U: Floats, options: ControlOptions, side: float | None) -> Footprint:
@@ -254,6 +275,8 @@ def _columns(
         slope_up=flat.slopes[0],
         slope_down=flat.slopes[1],
         curvature=curvature,
+        low=bottom,
+        high=top,
         flattenings=flat.flattenings,
         horizons=horizons,
         datum=Datum(datum, means[0], means[1]),
@@ -303,8 +326,8 @@ def build_control(
         offsets = np.full((2, columns.count), reach)
         return columns, columns.layers(offsets, FRACTIONS)
 
-    def capped(focal: float, slope: float) -> tuple[Columns, Layers]:
-        caps = _sloping_caps(columns, focal, slope)
+    def capped(slope: float) -> tuple[Columns, Layers]:
+        caps = _sloping_caps(columns, options.focal, slope)
         return columns, columns.layers(_offsets(columns, foot, caps, options), FRACTIONS)
 
     def refined() -> tuple[Columns, Layers]:
@@ -314,17 +337,13 @@ def build_control(
         return finer, finer.layers(_offsets(finer, foot, caps, options), FINE_FRACTIONS)
 
     rungs: list[tuple[str, Callable[[], tuple[Columns, Layers]]]]
-    rungs = [("capped", partial(capped, options.focal, slope)) for slope in options.slopes]
+    rungs = [("capped", partial(capped, slope)) for slope in options.slopes]
     rungs.append(("refined", refined))
-    caps = _focal_caps(columns.curvature[:, : columns.count], options.focal)
-    if not (caps < reach).any():
+    if not (_room(columns, options.focal) < reach).any():
         rungs.insert(0, ("constant", constant))
     climbed = climb(rungs, points, options.shrinks)
     columns, laid = climbed.columns, climbed.laid
-    low, high = columns.horizons.crossings(
-        columns.prints.U, columns.slip[: columns.count], limit=2 * reach
-    )
-    heights = {"mid": np.zeros(columns.count), "top": high, "bottom": low}
+    heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}
     return SheetMesh(
         control=laid.control(),

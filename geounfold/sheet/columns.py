@@ -14,6 +14,8 @@ from geounfold.sheet.horizons import Horizons
 from geounfold.sheet.layers import Layers
 from geounfold.sheet.shell import Surround, surround
 
+_BARE = 0.15  # blocks past top and bottom, where there is no room for more
+
 
 @dataclass(frozen=True, eq=False)
 class Laid:
@@ -99,6 +101,8 @@ class Columns:
         See Layers.
     curvature : (2, n + r) float
         See Layers.
+    low, high : (n,) float
+        Heights at which the nodes' normals meet bottom and top.
     flattenings : dict of Flattening
         How the mid surface and its parallel surfaces were flattened.
     horizons : Horizons
@@ -117,6 +121,8 @@ class Columns:
     slope_up: Floats
     slope_down: Floats
     curvature: Floats
+    low: Floats
+    high: Floats
     flattenings: dict[str, Flattening]
     horizons: Horizons
     datum: Datum
@@ -147,6 +153,15 @@ class Columns:
             offsets[1],
             fractions,
         )
+
+    def bare(self, layers: Layers) -> Layers:
+        """Return prisms that reach little farther than top and bottom."""
+        up, down = self.high + _BARE, -self.low + _BARE
+        return replace(layers, up=np.maximum(up, _BARE), down=np.maximum(down, _BARE))
+
+    def narrowed(self, nodes: Ints) -> Columns:
+        """Return the columns without those at some nodes that hold no block."""
+        return replace(self, prints=self.prints.without(nodes))
 
     def surround(self, layers: Layers) -> Surround:
         """Return the body's prisms with those around it."""

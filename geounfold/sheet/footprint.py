@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.ndimage as ndi
@@ -39,6 +39,10 @@ class Footprint:
         Triangles, counter-clockwise; no two parts touch in nothing but a corner.
     weight : (n,) float
         Number of blocks around each node, capped at the median: weights of registrations.
+    of_cell : (m,) int
+        Flat index of every triangle's cell.
+    held : (m,) bool
+        Whether that cell holds feet.
     cell_of : (b, 2) int
         Cell of every block's foot.
     node : (n,) int
@@ -56,12 +60,26 @@ class Footprint:
     U: Floats
     F: Ints
     weight: Floats
+    of_cell: Ints
+    held: Bools
     cell_of: Ints
     node: Ints
     shape: tuple[int, int]
     axes: Floats
     cell: float
     ring: Ring
+
+    def without(self, nodes: Ints) -> Footprint:
+        """Return the footprint whose cells at some nodes that hold no feet are the ring's."""
+        cells = np.zeros(self.shape, dtype=bool)
+        dropped = ~self.held & np.isin(self.F, nodes).any(axis=1)
+        cells.ravel()[self.of_cell] = True
+        cells.ravel()[self.of_cell[dropped]] = False
+        kept = _widened(cells, 0).ravel()[self.of_cell]
+        ring = Ring(self.ring.U, np.concatenate([self.F[~kept], self.ring.F]))
+        return replace(
+            self, F=self.F[kept], of_cell=self.of_cell[kept], held=self.held[kept], ring=ring
+        )
 
     def at_nodes(self, cells: Floats, reach: int) -> Floats:
         """Return a cell field as a smooth upper bound at the nodes, (n,).
@@ -89,7 +107,10 @@ def principal_direction(sheet: Sheet, U: Floats) -> float:
 
 
 def _triangles(cells: Bools) -> Ints:
-    """Return two triangles per set cell over the node grid, diagonals alternating."""
+    """Return two triangles per set cell over the node grid, diagonals alternating.
+
+    The first of every cell, in the cells' order, then the second.
+    """
     i, j = np.nonzero(cells)
     width = cells.shape[1] + 1
     a, b = i * width + j, (i + 1) * width + j
@@ -163,6 +184,8 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 
         U=places(node),
         F=F.reshape(-1, 3),
         weight=around.ravel()[node],
+        of_cell=np.tile(np.flatnonzero(cells), 2),
+        held=np.tile(held[cells], 2),
         cell_of=at,
         node=node,
         shape=(int(shape[0]), int(shape[1])),

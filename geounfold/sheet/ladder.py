@@ -20,7 +20,7 @@ from geounfold.sheet.shell import less
 from geounfold.sheet.tents import with_tents
 from geounfold.untangle import untangle
 
-_BLENDS = 5  # rounds of falling back to a sound rung's offsets
+_BLENDS = 8  # rounds of falling back to nearer offsets
 _BLEND = 0.6  # largest slope of the offsets between the two
 _MOVABLE = 0.1  # share of the vertices beyond which nothing is untangled
 _TENTS = 0.002  # share of the blocks beyond which the next rung is tried first
@@ -35,8 +35,9 @@ class Rung:
     ----------
     name : str
         constant, capped, refined, shrunk, untangled.
-    inverted_folded, inverted_unfolded, crossing_folded, crossing_unfolded : int
-        Flaws of the body's tetrahedra.
+    inverted_folded, inverted_unfolded, crossing_folded, crossing_unfolded, unglued : int
+        Flaws of the body's tetrahedra: how many are inverted, pairs of border faces that cross,
+        vertices and tetrahedra where they are not glued to a manifold.
     outside, lost : int or None
         Blocks that they do not hold, and those that the shell does not hold either; None where
         that was not asked.
@@ -49,6 +50,7 @@ class Rung:
     inverted_unfolded: int
     crossing_folded: int
     crossing_unfolded: int
+    unglued: int
     outside: int | None = None
     lost: int | None = None
     steps: int = 0
@@ -61,6 +63,7 @@ class Rung:
             + self.inverted_unfolded
             + self.crossing_folded
             + self.crossing_unfolded
+            + self.unglued
         )
 
 
@@ -104,6 +107,7 @@ class _Exam:
             len(self.unfolded.inverted),
             len(self.folded.crossing),
             len(self.unfolded.crossing),
+            len(self.gluing.misglued) + (0 if self.gluing.closed else len(self.gluing.pinched)),
             steps=steps,
         )
 
@@ -137,9 +141,11 @@ def climb(
         if laid is None:
             flawed.append((records[-1].flaws, len(flawed), columns, layers, exam))
             sound = [mesh.layers for _, _, _, other, mesh in held if other is columns]
-            if sound:
-                laid, rung = _blended(columns, layers, sound[-1], exam)
-            else:
+            near = sound[-1] if sound else columns.bare(layers)
+            columns, laid, rung = _blended(columns, layers, near, exam)
+            if laid is None and not sound:
+                records.append(rung)
+                _, _, columns, layers, exam = flawed[-1]
                 laid, rung = _untangled(columns, layers, exam)
             records.append(rung)
         if laid is None:
@@ -157,27 +163,27 @@ def climb(
 
 
 def _blended(
-    columns: Columns, layers: Layers, sound: Layers, exam: _Exam
-) -> tuple[Laid | None, Rung]:
-    """Return prisms that reach no farther than a sound rung's around what is wrong.
+    columns: Columns, layers: Layers, near: Layers, exam: _Exam
+) -> tuple[Columns, Laid | None, Rung]:
+    """Return prisms that reach no farther than near ones around what is wrong.
 
-    None where they are not proved.
+    Columns there that hold no block are left out.  None where they are not proved.
     """
     mean, n = neighbour_mean(layers.F, len(layers.P)), len(layers.P)
     back = np.zeros(n, dtype=bool)
+    low = np.minimum([near.up, near.down], [layers.up, layers.down])
     laid, step = None, 0
     while laid is None and step < _BLENDS:
         step += 1
-        back[exam.vertices % n] = True
+        touched = np.unique(exam.vertices % n)
+        columns = columns.narrowed(touched)
+        back[touched] = True
         back = np.asarray(mean @ back > 0) | back
-        near, far = (np.stack([q.up, q.down]) for q in (sound, layers))
-        offsets = [
-            bounded_slope(np.where(back, low, high), columns.prints.U, layers.F, _BLEND)
-            for low, high in zip(near, far, strict=True)
-        ]
-        offsets = [np.maximum(q, low) for q, low in zip(offsets, near, strict=True)]
-        laid, exam = _proved(columns, replace(layers, up=offsets[0], down=offsets[1]))
-    return laid, exam.rung("blended", step)
+        wanted = np.where(back, low, [layers.up, layers.down])
+        slopes = [bounded_slope(q, columns.prints.U, layers.F, _BLEND) for q in wanted]
+        offsets, F = np.maximum(slopes, low), columns.prints.F
+        laid, exam = _proved(columns, replace(layers, F=F, up=offsets[0], down=offsets[1]))
+    return columns, laid, exam.rung("blended", step)
 
 
 def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:

@@ -28,9 +28,11 @@ def test_one_row_per_surface_and_flattener():
     assert (table.error == "").all()
     assert (table.flips == 0).all()
     assert (table.seconds > 0).all()
-    # Two triangles unfold exactly: measured 7e-16 at most.
-    assert (table.symmetric_dirichlet < 4 + 1e-9).all()
-    assert (table.area_error < 1e-9).all()
+    assert (table.overlaps == 0).all()
+    # Two triangles unfold exactly: measured 7e-16 at most.  The harmonic map makes them round.
+    shapely = table[table.flattener != "harmonic"]
+    assert (shapely.symmetric_dirichlet < 4 + 1e-9).all()
+    assert (shapely.area_error < 1e-9).all()
 
 
 def test_a_failing_method_is_a_row_that_says_why():

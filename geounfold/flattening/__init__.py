@@ -14,9 +14,11 @@ from geounfold.flattening._ladder import one_to_one
 from geounfold.flattening._problem import Problem, make_problem, upright
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.arap import ArapOptions, arap
+from geounfold.flattening.harmonic import HarmonicOptions, harmonic
 from geounfold.flattening.initial import check_disk
 from geounfold.flattening.initial import tutte as _tutte
 from geounfold.flattening.lscm import LscmOptions, lscm
+from geounfold.flattening.mds import MdsOptions, mds
 from geounfold.flattening.scaf import ScafOptions, scaf
 from geounfold.flattening.slim import SlimOptions, slim
 from geounfold.flattening.spring import SpringOptions, spring
@@ -28,7 +30,9 @@ __all__ = [
     "ArapOptions",
     "Flattener",
     "Flattening",
+    "HarmonicOptions",
     "LscmOptions",
+    "MdsOptions",
     "ScafOptions",
     "SlimOptions",
     "SpringDynamicOptions",
@@ -54,8 +58,8 @@ class Flattener:
     options : type
         Its options, a frozen dataclass that checks itself.
     keeps : str
-        What it keeps where the surface allows that, and nearly keeps elsewhere: ``lengths`` or
-        ``angles``.
+        What it keeps where the surface allows that, and nearly keeps elsewhere: ``lengths``,
+        ``angles``, or ``nothing`` but neighbourhood.
     """
 
     name: str
@@ -75,6 +79,8 @@ FLATTENERS: dict[str, Flattener] = {
         Flattener("lscm", lscm, False, LscmOptions, "angles"),
         Flattener("slim", slim, False, SlimOptions),
         Flattener("scaf", scaf, False, ScafOptions),
+        Flattener("mds", mds, False, MdsOptions),
+        Flattener("harmonic", harmonic, False, HarmonicOptions, "nothing"),
     )
 }
 

@@ -106,7 +106,7 @@ def tutte(problem: Problem) -> Floats:
     edges = unique_edges(np.concatenate(faces))
     total = n + len(problem.loops) - 1
     uv = np.zeros((total, 2))
-    uv[outer] = _circle(problem, outer)
+    uv[outer] = circle(problem, outer)
     gradient = incidence(edges, total)
     laplacian = sp.csr_array(gradient.T @ gradient)
     free = np.ones(total, dtype=bool)
@@ -117,7 +117,7 @@ def tutte(problem: Problem) -> Floats:
     return upright(uv[:n], problem.mesh.F)
 
 
-def _circle(problem: Problem, loop: Ints) -> Floats:
+def circle(problem: Problem, loop: Ints) -> Floats:
     """Return a loop on a circle of the surface's area, spaced by the loop's rest lengths."""
     n = len(problem.mesh.V)
     ends = np.sort(_cycle(loop), axis=1)

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from geounfold.errors import FlatteningError, OptionError
+from geounfold.backends.injective import SlimSteps
+from geounfold.errors import BackendError, FlatteningError, OptionError
 from geounfold.flattening._guard import FoldGuard
 from geounfold.flattening._linear import factor, incidence, pinned_solver, preconditioned_solve
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
@@ -32,6 +33,9 @@ HALVINGS = 30
 
 #: Newton steps after which folded triangles end a run that has no barrier.
 PATIENCE = 12
+
+#: Steps of SLIM before the barrier is added, where the start is far from its rest lengths.
+NEARER = 10
 
 #: Residual of a Newton step's equations, as a share of their load: from fine to rough.
 RESIDUAL = (1e-5, 1e-2)
@@ -90,7 +94,8 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
     then Newton's method minimises the springs' energy, with the exact Hessian where that gives
     a descent, else without the shortened springs' negative parts.  Springs alone may fold a
     surface over at its minimum, doubly curved ones above all.  Such an answer is redone from
-    the last start without flips, with a barrier against lost triangles added; the note says so.
+    the last start without flips, brought near its rest lengths by a few steps of SLIM, with a
+    barrier against lost triangles added; the note says so.
 
     Parameters
     ----------
@@ -142,11 +147,29 @@ def _guarded(
         unfolded = _warm_start(problem, unfolded, options)[1]
         if unfolded is None:  # Tutte's embedding itself has no flips
             raise FlatteningError("spring: no start without flipped triangles was found")
+    unfolded = _nearer(problem, unfolded, options)
     history = History.empty(problem)
     system = _System(problem, place, FoldGuard(problem.mesh.F, problem.areas))
     uv, steps, stop = _descend(system, unfolded, options, history, options.max_iter)
     note = f"the springs alone fold {flips} triangles over: redone with a barrier against folding"
     return finish(problem, uv, "spring", stop, before + steps, history, note)
+
+
+def _nearer(problem: Problem, uv: Floats, options: SpringOptions) -> Floats:
+    """Return a start without flips brought near its rest lengths by a few steps of SLIM.
+
+    The barrier lets Newton's method creep only, from a start far from its rest lengths.
+    """
+    strain = lengths(uv, problem.edges) / problem.rest - 1
+    if not problem.own or np.sqrt(np.mean(strain * strain)) <= options.warm_strain:
+        return uv
+    try:
+        step, after = SlimSteps(problem.mesh.V, problem.mesh.F, uv), uv
+        for _ in range(NEARER):
+            after = step()
+    except BackendError:  # the start as it is will do
+        return uv
+    return uv if flip_count(after, problem.mesh.F) else after
 
 
 def _warm_start(

@@ -1,0 +1,140 @@
+"""Flattening by distances along the surface and classical scaling (Zigelman et al. 2002)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.backends.distances import SurfaceDistances
+from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.flattening._problem import History, Problem, finish
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.mesh import Floats, Ints
+
+DISTANCES = ("auto", "exact", "heat")
+
+#: Most vertices for which ``auto`` takes exact distances: their time grows with n^2 log n.
+EXACT_UP_TO = 1500
+
+#: Least height of a triangle, as a share of the surface's median edge, for exact distances: on
+#: needles libigl's exact_geodesic never returns (seen with an edge of 1 mm among edges of 1 km).
+NEEDLE = 1e-3
+
+#: Second eigenvalue over the first below which the distances are those of a line.
+LINE = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class MdsOptions:
+    """Options of ``mds``.
+
+    Parameters
+    ----------
+    landmarks : int
+        Vertices from which distances are measured, spread as far apart as can be; all vertices
+        where there are no more than that.
+    distances : str
+        ``exact`` shortest paths, the ``heat`` method, or ``auto``: exact up to 1,500 vertices
+        and where no triangle is a needle.
+    """
+
+    landmarks: int = 100
+    distances: str = "auto"
+
+    def __post_init__(self) -> None:
+        if self.landmarks < 3:
+            raise OptionError(f"mds: landmarks must be at least 3, but is {self.landmarks}")
+        if self.distances not in DISTANCES:
+            raise OptionError(
+                f"mds: distances must be one of {', '.join(DISTANCES)}, but is {self.distances}"
+            )
+
+
+def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flattening:
+    """Flatten by classical scaling of distances along the surface.
+
+    The plane that best reproduces the squared distances among landmarks, centred, is spanned by
+    the two largest eigenvectors (Torgerson 1952); the other vertices follow from their distances
+    to the landmarks (de Silva and Tenenbaum 2004).  Exact where the surface is developable and
+    its flat image convex: elsewhere shortest paths bend round the border, and distances are
+    shorter than in the plane.  Nothing bars triangles from folding.  A direct solve, so a start
+    changes nothing.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface; its rest lengths are its edges' own.
+    start : (n, 2) float or None
+        Not used.
+    options : MdsOptions
+        See there.
+
+    Returns
+    -------
+    Flattening
+        ``energy`` is the mean squared error of the distances to the landmarks, in square units.
+    """
+    V, F = problem.mesh.V, problem.mesh.F
+    needles = _needles(problem)
+    if needles and options.distances == "exact":
+        raise FlatteningError(
+            f"mds: exact distances cannot be had over {needles} triangles that are needles; "
+            "remesh the surface, or take distances by heat"
+        )
+    exact = options.distances != "heat" and not needles
+    exact &= options.distances == "exact" or len(V) <= EXACT_UP_TO
+    try:
+        field = SurfaceDistances((V - V.mean(axis=0)) / problem.size, F, exact)
+        chosen, D = _to_landmarks(field, V, min(options.landmarks, len(V)))
+    except BackendError as err:
+        raise FlatteningError(f"mds: {err}") from err
+    uv = _scaled(D, chosen) * problem.size
+    history = History.empty(problem)
+    apart = np.linalg.norm(uv[chosen][:, None] - uv[None], axis=2)
+    history.record(uv, float(np.mean((apart - D * problem.size) ** 2)))
+    kind = "exact" if exact else "heat"
+    note = f"{kind} distances from {len(chosen)} of {len(V)} vertices"
+    return finish(problem, uv, "mds", Stop.DIRECT, 0, history, note)
+
+
+def _needles(problem: Problem) -> int:
+    """Return the number of triangles too thin for exact distances."""
+    sides = np.abs(problem.corners - np.roll(problem.corners, 1, axis=1))
+    height = 2 * problem.areas / sides.max(axis=1)
+    return int(np.count_nonzero(height < NEEDLE * np.median(problem.rest)))
+
+
+def _to_landmarks(field: SurfaceDistances, V: Floats, count: int) -> tuple[Ints, Floats]:
+    """Return landmarks (k,) and the distances (k, n) from each of them.
+
+    The first is the vertex farthest from the mean, each further one the farthest from all before.
+    """
+    if count == len(V):
+        chosen = np.arange(count)
+        return chosen, np.stack([field(k) for k in range(count)])
+    nearest = np.full(len(V), np.inf)
+    following = int(np.argmax(((V - V.mean(axis=0)) ** 2).sum(axis=1)))
+    picked, rows = [], []
+    for _ in range(count):
+        picked.append(following)
+        rows.append(field(following))
+        nearest = np.minimum(nearest, rows[-1])
+        nearest[picked] = -np.inf
+        following = int(np.argmax(nearest))
+    return np.array(picked), np.stack(rows)
+
+
+def _scaled(D: Floats, chosen: Ints) -> Floats:
+    """Return plane positions (n, 2) by the distances (k, n) from the landmarks."""
+    squared = D * D
+    among = squared[:, chosen]
+    among = (among + among.T) / 2  # the heat method's differ one way and back
+    mean = among.mean(axis=0)
+    values, vectors = np.linalg.eigh(-(among - mean - mean[:, None] + mean.mean()) / 2)
+    large, small = values[-1], values[-2]
+    if not small > LINE * large:
+        raise FlatteningError("mds: the distances span no plane; take another method")
+    axes = vectors[:, [-1, -2]] / np.sqrt([large, small])
+    out: Floats = -(squared - mean[:, None]).T @ axes / 2
+    return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -229,6 +230,9 @@ def test_result_is_centred_upright_frozen_and_repeatable(method):
     assert np.array_equal(first.uv, second.uv)
     assert_allclose(first.uv.mean(axis=0), 0, atol=1e-12)
     assert triangle_areas(first.uv, mesh[1]).sum() > 0
+    # The last record is the answer's own.
+    assert first.area_error[-1] == pytest.approx(measures.area_error(*mesh, first.uv))
+    assert first.edge_error[-1] == pytest.approx(measures.edge_strain(*mesh, first.uv))
     assert len(first.energy) == len(first.area_error) == len(first.edge_error) > 0
     with pytest.raises(ValueError, match="read-only"):
         first.uv[0] = 0
@@ -358,6 +362,17 @@ def test_crumpling_springs_are_held_by_the_guard():
     assert folded.flips > 0
     assert flat.flips == 0
     assert "barrier" in flat.note
+
+
+def test_a_guarded_start_far_from_its_lengths_is_brought_near_first(monkeypatch):
+    mesh = nearly_closed()
+    near = flatten(mesh)
+    # The package's name `spring` is the function.
+    monkeypatch.setattr(sys.modules[SpringOptions.__module__], "NEARER", 0)
+    far = flatten(mesh)
+    assert near.flips == far.flips == 0
+    assert near.energy[0] < far.energy[0]  # measured 4.48 and 5.57
+    assert near.energy[-1] < far.energy[-1]  # measured 3.398 and 3.422, neither at rest
 
 
 def test_dynamic_reaches_the_minimum_of_spring():

@@ -8,7 +8,7 @@ import numpy as np
 
 from geounfold.backends.distances import SurfaceDistances
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.flattening._problem import History, Problem, finish
+from geounfold.flattening._problem import History, Problem, finish, upright
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.mesh import Floats, Ints
 
@@ -89,7 +89,7 @@ def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flatteni
         chosen, D = _to_landmarks(field, V, min(options.landmarks, len(V)))
     except BackendError as err:
         raise FlatteningError(f"mds: {err}") from err
-    uv = _scaled(D, chosen) * problem.size
+    uv = upright(_scaled(D, chosen) * problem.size, F)
     history = History.empty(problem)
     apart = np.linalg.norm(uv[chosen][:, None] - uv[None], axis=2)
     history.record(uv, float(np.mean((apart - D * problem.size) ** 2)))

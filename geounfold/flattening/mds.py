@@ -15,7 +15,7 @@ from geounfold.mesh import Floats, Ints
 DISTANCES = ("auto", "exact", "heat")
 
 #: Most vertices for which ``auto`` takes exact distances: their time grows with n^2 log n.
-EXACT_UP_TO = 1500
+EXACT_UP_TO = 600
 
 #: Least height of a triangle, as a share of the surface's median edge, for exact distances: on
 #: needles libigl's exact_geodesic never returns (seen with an edge of 1 mm among edges of 1 km).
@@ -35,7 +35,7 @@ class MdsOptions:
         Vertices from which distances are measured, spread as far apart as can be; all vertices
         where there are no more than that.
     distances : str
-        ``exact`` shortest paths, the ``heat`` method, or ``auto``: exact up to 1,500 vertices
+        ``exact`` shortest paths, the ``heat`` method, or ``auto``: exact up to 600 vertices
         and where no triangle is a needle.
     """
 

@@ -32,6 +32,7 @@ from geounfold.mapping import Carried, UnfoldingMap, checked_points
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 from geounfold.options import UnfoldOptions
 from geounfold.quality import Quality, assess, epsilon
+from geounfold.solid import solid_cells
 
 Progress = Callable[[str], None]
 
@@ -107,12 +108,17 @@ def unfold(
     with clock.stage("frame"):
         P = _points(points)
         lattice = measure_lattice(P)
-        check_points(P, lattice)
-        frame = working_frame(P, lattice)
-        work = np.ascontiguousarray(frame.snap(frame.to_work(P)))
-        groups = select_body(P, separate_bodies(work, frame), chosen.body)
+        solid = solid_cells(P, lattice)
+        filled, lattice = (P, lattice) if solid is None else (solid.points, solid.lattice)
+        check_points(filled, lattice)
+        frame = working_frame(filled, lattice)
+        work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))
+        labels = separate_bodies(work, frame)
+        own = labels if solid is None else labels[solid.home]
+        groups = select_body(P, own, chosen.body)
+        parts = [_sorted(work[labels == own[group[0]]]) for group in groups]
     reference = _reference(top, bottom, frame)
-    fits = [fit(_sorted(work[group]), frame, chosen, reference, clock.stage) for group in groups]
+    fits = [fit(part, frame, chosen, reference, clock.stage) for part in parts]
     with clock.stage("map"):
         mapping = _mapping(fits, frame, chosen)
         carried = mapping.carry(P)

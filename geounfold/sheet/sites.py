@@ -11,6 +11,16 @@ from geounfold.geometry import sorted_distinct
 from geounfold.mesh import Bools, Floats, Ints
 
 
+PIT = 13
+"""Most blocks among the 26 neighbours of a place outside a plane of any direction."""
+
+PITS = 0.005
+"""Share of deeper places from which they are taken for missing blocks and say nothing.
+
+Measured: at most 0.002 where no block is missing (inner hinges), 0.015 where 5 % are.
+"""
+
+
 @dataclass(frozen=True, eq=False)
 class Sites:
     """Blocks with an empty neighbour, and those empty neighbours.
@@ -51,7 +61,10 @@ def surface_sites(cells: Ints, steps: Floats) -> Sites:
         missing = keys[at] != wanted
         open_ |= missing
         empty.append(wanted[missing])
-    outside = sorted_distinct(np.concatenate(empty))
+    outside, around = np.unique(np.concatenate(empty), return_counts=True)
+    pits = around > PIT
+    if pits.mean() > PITS:
+        outside = outside[~pits]
     every = np.concatenate([keys[open_], outside])
     i, rest = np.divmod(every, stride[0])
     j, k = np.divmod(rest, stride[1])

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geounfold.cloud import scattered, scattered_spacing
 from geounfold.errors import OptionError
 from geounfold.lattice import (
     TOLERANCE,
@@ -212,7 +213,7 @@ def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
 
 def _cloud_frame(points: Floats) -> Frame:
     """Principal axes, origin at the mean, unit at the typical spacing."""
-    scale = point_spacing(points)
+    scale = scattered_spacing(points) if scattered(points) else point_spacing(points)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     origin = middle + (points - middle).mean(axis=0)
     X = points - origin

@@ -218,8 +218,8 @@ def _merged(low: Ints, count: Ints, merge: int) -> tuple[Ints, Floats]:
     shape = tuple(every.max(axis=0) - start + 1)
     keys = np.ravel_multi_index(tuple((every - start).T), shape)
     distinct, row = np.unique(keys, return_inverse=True)
-    share: Floats = np.bincount(row, np.concatenate(weights))
-    return np.stack(np.unravel_index(distinct, shape), axis=1) + start, share
+    cells = np.stack(np.unravel_index(distinct, shape), axis=1) + start
+    return cells, np.bincount(row, np.concatenate(weights))
 
 
 def _nearest_cell(cells: Ints, places: Floats) -> Ints:
@@ -292,7 +292,8 @@ def parting(cells: Ints) -> Ints:
             across &= np.isin(pair, joined)
             found += [keys[across] + i * step for i in range(1, width + 1)]
     between = sorted_distinct(np.concatenate(found))
-    return _places(between[~_held(between, keys)], stride) + low
+    out: Ints = _places(between[~_held(between, keys)], stride) + low
+    return out
 
 
 def _parts(keys: Ints, stride: Ints) -> Ints:
@@ -339,7 +340,8 @@ def surrounded(cells: Ints) -> Ints:
             break
         added.append(fresh)
         keys = sorted_distinct(np.concatenate([keys, fresh]))
-    return _places(np.concatenate(added), stride) + low
+    out: Ints = _places(np.concatenate(added), stride) + low
+    return out
 
 
 def _held(wanted: Ints, keys: Ints) -> Bools:

@@ -8,19 +8,22 @@ from dataclasses import replace
 import numpy as np
 
 from geounfold.backends import igl as _igl
+from geounfold.cloud import scattered
 from geounfold.errors import HullError, OptionError
 from geounfold.geometry import face_normals, triangle_areas
 from geounfold.hull._finish import HullOptions
 from geounfold.hull._result import Hull
 from geounfold.hull.alpha import alpha_hull
 from geounfold.hull.ball_pivoting import ball_pivoting_hull
-from geounfold.hull.density import density_hull
+from geounfold.hull.density import density_hull, scattered_hull
 from geounfold.hull.poisson import poisson_hull
 from geounfold.mesh import Floats
 
 __all__ = ["HULLS", "Hull", "HullOptions", "extract_hull", "unsuitability"]
 
-HULLS: dict[str, Callable[[Floats, Floats, HullOptions], Hull]] = {
+Maker = Callable[[Floats, Floats, HullOptions], Hull]
+
+HULLS: dict[str, Maker] = {
     "density": density_hull,
     "alpha": alpha_hull,
     "ball_pivoting": ball_pivoting_hull,
@@ -63,16 +66,21 @@ def extract_hull(
     points = np.asarray(points, dtype=np.float64)
     options = options or HullOptions()
     sides = np.ones(3) if steps is None or steps.max() <= UNEQUAL * steps.min() else steps
+    makers = HULLS
+    if steps is None and scattered(points):
+        makers = HULLS | {"density": scattered_hull}
     if method == "auto":
-        return _first_suitable(points, sides, options)
+        return _first_suitable(makers, points, sides, options)
     if method not in HULLS:
         raise OptionError(f"unknown hull '{method}'; valid: auto, {', '.join(HULLS)}")
-    return HULLS[method](points, sides, options)
+    return makers[method](points, sides, options)
 
 
-def _first_suitable(points: Floats, sides: Floats, options: HullOptions) -> Hull:
+def _first_suitable(
+    makers: dict[str, Maker], points: Floats, sides: Floats, options: HullOptions
+) -> Hull:
     refused: list[str] = []
-    for name, make in HULLS.items():
+    for name, make in makers.items():
         try:
             hull = make(points, sides, options)
         except HullError as error:

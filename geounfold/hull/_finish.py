@@ -56,7 +56,7 @@ def finish(
     F: Ints,
     *,
     method: str,
-    blocks: int,
+    blocks: float,
     inset: float,
     blur: float,
     options: HullOptions,
@@ -74,7 +74,7 @@ def finish(
     method, inset, blur
         As in Hull.
     blocks : int
-        Number of blocks: the volume in working units.
+        The blocks' volume in working units: their number.
     options : HullOptions
         Edge length and remeshing.
     project : callable, optional

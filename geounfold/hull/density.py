@@ -28,6 +28,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from geounfold.backends import igl as _igl
+from geounfold.cloud import local_spacing
 from geounfold.geometry import unit
 from geounfold.hull._finish import HullOptions, finish, smoothed
 from geounfold.hull._result import UNEQUAL, Hull
@@ -43,6 +44,7 @@ THIN = (0.3, 0.7)
 
 Measured: 0.48 to 0.59 for one block, 0.71 to 0.78 for two; below, the lattice is mostly empty.
 """
+LOOSE = 1.25  # standard deviation of the blur of scattered points, in their spacing
 _CLIP = 1e-4  # the quantile function is clipped to this share of the density
 _CORNERS = np.array(
     [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
@@ -183,35 +185,65 @@ def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     field = density_field(points / sides, options.sigma)
     thin = THIN[0] < field.filling < THIN[1]
     flat = sides.max() > UNEQUAL * sides.min()
-    inset = 0.0
+    blur, inset = field.blur, 0.0
     if thin:
         solid = float(sides.max() ** 3 / sides.prod())
         sides = np.full(3, sides.max())  # flat blocks in a thin sheet may not even touch
         field = density_field(points / sides, options.sigma_thin)
         inset = field.inset(options.level, solid) * float(sides[0])
-    V, F = field.level_set(options.level, fine=thin)
-    hull = finish(
-        V * sides,
-        F,
-        method="density",
-        blocks=len(points),
-        inset=inset,
-        blur=field.blur * (float(sides[0]) if thin else 1.0),
-        options=options,
-        project=lambda x: field.project(x / sides, options.level) * sides,
-    )
-    hull = replace(hull, even=thin)
+        blur = field.blur * float(sides[0])
+    hull = _finished(field, sides, len(points), blur, options, inset=inset, fine=thin)
     # Flat blocks climb a slope in stairs wider than the blur: unsmoothed, they pass for rims
     # (rms 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
     return smoothed(hull, options.smoothing) if flat else hull
 
 
-def density_field(points: Floats, sigma: float = 0.8) -> DensityField:
+def scattered_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
+    """Return the density hull of scattered points, each weighted by the volume around it.
+
+    At random points the density is uneven: it is blurred more, and what it would enclose
+    with nothing blurred counts as the blocks' volume.
+    """
+    coarse = LOOSE / options.sigma
+    weights = local_spacing(points) ** 3
+    field = density_field(points / coarse, options.sigma, weights)
+    volume = float(weights.sum()) / field.inner * (NODE * coarse) ** 3
+    return _finished(field, np.full(3, coarse), volume, field.blur * coarse, options)
+
+
+def _finished(
+    field: DensityField,
+    sides: Floats,
+    volume: float,
+    blur: float,
+    options: HullOptions,
+    *,
+    inset: float = 0.0,
+    fine: bool = False,
+) -> Hull:
+    """Return the level set of a field of points / sides as a hull."""
+    V, F = field.level_set(options.level, fine=fine)
+    hull = finish(
+        V * sides,
+        F,
+        method="density",
+        blocks=volume,
+        inset=inset,
+        blur=blur,
+        options=options,
+        project=lambda x: field.project(x / sides, options.level) * sides,
+    )
+    return replace(hull, even=fine)
+
+
+def density_field(
+    points: Floats, sigma: float = 0.8, weights: Floats | None = None
+) -> DensityField:
     """Return the density of points (n, 3), blurred by a Gaussian of standard deviation sigma."""
     origin = points.min(axis=0) - 2 * BRICK * NODE
     q = (points - origin) / NODE
     reach = math.ceil(RADIUS * sigma / NODE)
-    splat, variance = _splat(q, reach)
+    splat, variance = _splat(q, reach, weights)
     kernel = _kernel(sigma / NODE, reach)
     bricks = _blur(splat, kernel)
     density = _trilinear(bricks, q)
@@ -245,7 +277,7 @@ def _occupied(cell: Ints, reach: int) -> _Bricks:
     return _Bricks(slot, index, np.zeros((len(index) + 1, BRICK, BRICK, BRICK)))
 
 
-def _splat(q: Floats, reach: int) -> tuple[_Bricks, float]:
+def _splat(q: Floats, reach: int, weights: Floats | None) -> tuple[_Bricks, float]:
     """Spread each point over the eight nodes around it; also the mean variance that adds.
 
     The bricks leave room for a blur of ``reach`` nodes.
@@ -258,7 +290,8 @@ def _splat(q: Floats, reach: int) -> tuple[_Bricks, float]:
         brick, local = np.divmod(cell + np.array(corner), BRICK)
         row = bricks.slot[brick[:, 0], brick[:, 1], brick[:, 2]]
         at = ((row * BRICK + local[:, 0]) * BRICK + local[:, 1]) * BRICK + local[:, 2]
-        np.add.at(flat, at, np.where(corner, f, 1 - f).prod(axis=1))
+        part = np.where(corner, f, 1 - f).prod(axis=1)
+        np.add.at(flat, at, part if weights is None else part * weights)
     return bricks, float((f * (1 - f)).mean())
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from geounfold.geometry import sorted_distinct
 from geounfold.mesh import Bools, Floats, Ints
 
-
 PIT = 13
 """Most blocks among the 26 neighbours of a place outside a plane of any direction."""
 

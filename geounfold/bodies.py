@@ -115,7 +115,8 @@ def separate_bodies(points_work: Floats, frame: Frame) -> Ints:
         if not cells.gappy():
             labels = _connected_cells(cells)[cells.cell]
     if labels is None:
-        labels = _connected_points(points_work)
+        sides = 1.0 if frame.sides is None else frame.sides
+        labels = _connected_points(points_work / sides)
     return _by_size(labels, points_work)
 
 

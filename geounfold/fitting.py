@@ -104,7 +104,7 @@ def fit(
             method = options.hull
             if options.method == "thesis" and method == "auto":
                 method = "alpha"
-            hull = extract_hull(points, frame.steps, method, options.hull_options)
+            hull = extract_hull(points, frame.sides, method, options.hull_options)
         with stage("split"):
             parts = split(hull.mesh, options.split)
     else:
@@ -140,7 +140,7 @@ def _fit_sheet(
     datum: str,
     stage: Stage,
 ) -> BodyFit:
-    variance = np.zeros(3) if hull is None else hull.blur_variance(frame.steps)
+    variance = np.zeros(3) if hull is None else hull.blur_variance(frame.sides)
     inset = 0.0 if hull is None else hull.inset
     with stage("sheet"):
         result = fit_body(

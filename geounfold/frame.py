@@ -11,7 +11,7 @@ rotation is the thesis's followed by a turn about z that brings the first princi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,13 +61,17 @@ class Frame:
     scale : float
         Length of one working unit in the input's unit.
     steps : (3,) float or None
-        Block sides along the frame's axes in working units (product 1), None without a lattice.
+        Block sides along the frame's axes in working units (product 1) where blocks lie at whole
+        multiples of them; None without a lattice, and where noise has moved them off it.
+    sides : (3,) float or None
+        Block sides, on a lattice or about one; None where they are not known.
     """
 
     origin: Floats
     rotation: Floats
     scale: float
     steps: Floats | None
+    sides: Floats | None = None
 
     def to_work(self, points: Floats) -> Floats:
         """Return world points (n, 3) in the working frame."""
@@ -109,7 +113,7 @@ class Frame:
         return out
 
 
-def working_frame(points: Floats, lattice: Lattice | None) -> Frame:
+def working_frame(points: Floats, lattice: Lattice | None, *, exact: bool = True) -> Frame:
     """Return the canonical working frame of a cloud (see Frame).
 
     Canonical: a rigid motion, another unit or another order of the rows gives the same set of
@@ -129,6 +133,8 @@ def working_frame(points: Floats, lattice: Lattice | None) -> Frame:
         World coordinates, not all in one plane.
     lattice : Lattice or None
         As measure_lattice gives it.
+    exact : bool
+        Whether the points lie on the lattice; else they scatter about it.
 
     Raises
     ------
@@ -136,7 +142,8 @@ def working_frame(points: Floats, lattice: Lattice | None) -> Frame:
         Without a lattice: fewer than two distinct points.
     """
     if lattice is not None:
-        return _lattice_frame(points, lattice)
+        frame = _lattice_frame(points, lattice)
+        return frame if exact else replace(frame, steps=None)
     return _cloud_frame(points)
 
 
@@ -201,13 +208,15 @@ def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
     turn = _greatest(turns, np.array([_turned(table, turn) for turn in turns]), lattice.axes)
     rotation = turn @ lattice.axes
     steps = (turn * turn) @ lattice.steps
+    sides = np.array([float(f"{step:.10g}") for step in steps / scale])
     turned = cells @ turn.T.astype(np.int64)
     middle = (2 * turned.sum(axis=0) + len(cells)) // (2 * len(cells))
     return Frame(
         origin=lattice.origin + (middle * steps) @ rotation,
         rotation=rotation,
         scale=scale,
-        steps=np.array([float(f"{step:.10g}") for step in steps / scale]),
+        steps=sides,
+        sides=sides,
     )
 
 

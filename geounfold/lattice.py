@@ -102,9 +102,9 @@ def measure_lattice(points: Floats) -> Lattice | None:
     guess = _directions(balls)
     if guess is None:
         return None
-    fit: _Fit | None = _Fit(guess[0], guess[1], _anchor(balls[0], *guess))
+    fit: Fit | None = Fit(guess[0], guess[1], _anchor(balls[0], *guess))
     for sample in _growing(balls):
-        fit = _refit(sample, fit, _LOOSE) if fit else None
+        fit = refit(sample, fit, _LOOSE) if fit else None
     return _accepted(X, fit, reference) if fit else None
 
 
@@ -159,7 +159,7 @@ def point_spacing(points: Floats) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class Fit:
     """Lattice positions are ``origin + (k * steps) @ axes``."""
 
     axes: Floats
@@ -279,7 +279,7 @@ def _anchor(ball: Floats, axes: Floats, steps: Floats) -> Floats:
     near = ball[:250]
     best, most = ball[0], -1
     for candidate in ball[:_CENTRAL]:
-        count = int(_on_lattice(_Fit(axes, steps, candidate).cells(near), _LOOSE).sum())
+        count = int(_on_lattice(Fit(axes, steps, candidate).cells(near), _LOOSE).sum())
         if count > most:
             best, most = candidate, count
     out: Floats = best
@@ -298,7 +298,7 @@ def _whole(cells: Floats, tolerance: float) -> Bools:
     return out
 
 
-def _refit(X: Floats, fit: _Fit, tolerance: float) -> _Fit | None:
+def refit(X: Floats, fit: Fit, tolerance: float) -> Fit | None:
     """Return the least-squares lattice of the points near a rough one; None where few are.
 
     Alternates orthogonal Procrustes for the axes with linear least squares for the steps,
@@ -320,24 +320,24 @@ def _refit(X: Floats, fit: _Fit, tolerance: float) -> _Fit | None:
         steps = np.divide(along, square, out=steps.copy(), where=square > 0)
     if (steps <= 0).any():
         return None
-    return _Fit(axes, steps, p_mean - (k_mean * steps) @ axes)
+    return Fit(axes, steps, p_mean - (k_mean * steps) @ axes)
 
 
-def _accepted(X: Floats, fit: _Fit, reference: Floats) -> Lattice | None:
+def _accepted(X: Floats, fit: Fit, reference: Floats) -> Lattice | None:
     """Return the lattice that 97 % of all points lie on, or None."""
-    loose = _refit(X, fit, _LOOSE)
+    loose = refit(X, fit, _LOOSE)
     if loose is None:
         return None
     steps = _finest(loose.cells(X), loose.steps)
     if steps is None:
         return None
-    last = _refit(X, _Fit(loose.axes, steps, loose.origin), TOLERANCE)
+    last = refit(X, Fit(loose.axes, steps, loose.origin), TOLERANCE)
     if last is None:
         return None
     share = float(_on_lattice(last.cells(X), TOLERANCE).mean())
     if share < SHARE:
         return None
-    axes, steps = _named(last.axes, last.steps)
+    axes, steps = named(last.axes, last.steps)
     middle = np.rint(last.cells(np.zeros((1, 3))))[0]
     origin = last.origin + (middle * last.steps) @ last.axes
     return Lattice(axes=axes, steps=steps, share=share, origin=reference + origin)
@@ -356,7 +356,7 @@ def _finest(cells: Floats, steps: Floats) -> Floats | None:
     return out
 
 
-def _named(axes: Floats, steps: Floats) -> tuple[Floats, Floats]:
+def named(axes: Floats, steps: Floats) -> tuple[Floats, Floats]:
     """Return axes and steps in the naming nearest to the world's axes, free of rounding."""
     turns = proper_permutations()
     best = turns[np.round(np.einsum("aij,ji->a", turns, axes), 9).argmax()]

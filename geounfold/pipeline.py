@@ -19,7 +19,9 @@ from geounfold.backends.blas import one_thread
 from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
 from geounfold.certificate import Certificate, certify
+from geounfold.cloud import QUIET, unevenness
 from geounfold.control import ControlMesh, scaled, side_by_side
+from geounfold.disturbed import disturbed_lattice
 from geounfold.errors import ControlMeshError, InputError
 from geounfold.fitting import BodyFit, SurfacePair, fit
 from geounfold.flattening import Flattening
@@ -110,8 +112,13 @@ def unfold(
         lattice = measure_lattice(P)
         solid = solid_cells(P, lattice)
         filled, lattice = (P, lattice) if solid is None else (solid.points, solid.lattice)
-        check_points(filled, lattice)
-        frame = working_frame(filled, lattice)
+        about = disturbed_lattice(P) if lattice is None and unevenness(P) > QUIET else None
+        if about is None:
+            check_points(filled, lattice)
+            frame = working_frame(filled, lattice)
+        else:
+            check_points(P @ about.axes.T / about.steps)
+            frame = working_frame(P, about, exact=False)
         work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))
         labels = separate_bodies(work, frame)
         own = labels if solid is None else labels[solid.home]

@@ -218,8 +218,9 @@ def _merged(low: Ints, count: Ints, merge: int) -> tuple[Ints, Floats]:
     shape = tuple(every.max(axis=0) - start + 1)
     keys = np.ravel_multi_index(tuple((every - start).T), shape)
     distinct, row = np.unique(keys, return_inverse=True)
-    cells = np.stack(np.unravel_index(distinct, shape), axis=1) + start
-    return cells, np.bincount(row, np.concatenate(weights))
+    merged = np.stack(np.unravel_index(distinct, shape), axis=1) + start
+    share: Floats = np.bincount(row, np.concatenate(weights)).astype(np.float64)
+    return merged, share
 
 
 def _nearest_cell(cells: Ints, places: Floats) -> Ints:

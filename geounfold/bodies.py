@@ -26,6 +26,7 @@ _FLAT = 0.05  # extent, in point spacings, below which points lie on a line or p
 _SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
 _MARGIN = 2  # blocks, the farthest neighbours that are looked up
 _SAMPLE = 2000  # blocks that are looked at
+_AROUND = 101  # nearest points among which three directions are looked for, itself included
 _NEAR, _WIDE = 21, 64  # neighbours that join scattered points, and those tried for the rest
 _REACH, _CAP = 1.15, 2.0  # of the near neighbours' distance; of its median
 
@@ -84,7 +85,8 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
     if lattice is None:
         lattice = measure_lattice(X)
     cells = None if lattice is None else _Cells.of(lattice_indices(X, lattice))
-    if (cells is None or cells.gappy()) and _one_layer_of_points(X):
+    loose = cells is None or cells.gappy()
+    if loose and _one_layer_of_points(X) and not _in_three_directions(X):
         raise InputError(
             f"the {len(X)} points lie on one surface, on no lattice of touching blocks: a sheet "
             "one block thick, and nothing tells how thick a block is; give at least two layers "
@@ -296,6 +298,26 @@ def _one_layer_of_points(X: Floats) -> bool:
     rms = np.sqrt(np.einsum("nk,nk->n", rest, rest) / (25 - 6))
     rms[spread[:, 1] < 0.05 * spread[:, 2]] = np.inf
     return bool(np.median(rms) < _SCATTER * np.median(distance[:, 1]))
+
+
+def _in_three_directions(X: Floats) -> bool:
+    """Say whether most points have neighbours along three directions, as blocks in layers have.
+
+    From the nearest other point; the nearest across it; and the nearest more than 60 degrees out
+    of the plane of both, which a sheet of one layer has none of.  Folded grids of flat or
+    long blocks, whose nearest points all lie on a line or two, count as thick by this.
+    """
+    some = X[:: -(-len(X) // _SAMPLE)]
+    near = _neighbours(cKDTree(X), some, _AROUND)[1]
+    D = X[near[:, 1:]] - some[:, None]
+    length = np.linalg.norm(D, axis=2)
+    first = D[:, 0] / length[:, :1]
+    across = np.abs(np.einsum("nki,ni->nk", D, first)) < 0.3 * length
+    second = D[np.arange(len(D)), across.argmax(axis=1)]
+    normal = np.cross(first, second)
+    size = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+    out = np.abs(np.einsum("nki,ni->nk", D, normal)) > 0.87 * length * size[:, None]
+    return bool((across.any(axis=1) & out.any(axis=1)).mean() > 0.5)
 
 
 def _neighbours(tree: cKDTree, points: Floats, count: int) -> tuple[Floats, Ints]:

@@ -19,9 +19,11 @@ from geounfold.mesh import Floats
 CLEAR = 0.3
 """Least coherence of all points along each axis: noise of 0.25 steps."""
 
-_PEAK = 0.12  # least coherence of the first points; 4,000 points at random reach 0.07
-_BALL = 4000  # points around the place where the search starts
+_PEAK = 0.12  # least coherence of the first points; 2,500 at random reach 0.09
+_BALL = 2500  # points around the place where the search starts
 _NODES = 128  # per axis of the transform's grid
+_HALVINGS = 12  # of the step towards a peak: to 1/4000 of its width
+_TRIED = 2000  # nodes of the transform whose coherence is taken without the grid, at most
 _LONGEST = 0.45  # longest step, of the ball's radius
 _SQUARE = 0.12  # largest cosine between wave vectors
 _HARMONIC = 0.6  # a shorter wave vector along the same line counts from this share of the peak
@@ -109,21 +111,36 @@ def _waves(ball: Floats) -> Floats | None:
     least = 1 / (_LONGEST * radius)
     size = np.sqrt(sum(np.square(a) for a in np.ix_(*q)))
     candidates = np.argwhere((power > _PEAK) & (size > least))
-    value = power[tuple(candidates.T)]
-    Q = np.stack([q[axis][candidates[:, axis]] for axis in range(3)], axis=1)
+    strongest = np.argsort(-power[tuple(candidates.T)], kind="stable")[:_TRIED]
+    Q = np.stack([q[axis][candidates[strongest, axis]] for axis in range(3)], axis=1)
+    value = _coherence(ball, taper, Q)  # not of the grid: waves too short for it pass for long ones
+    Q, value = Q[value > _PEAK], value[value > _PEAK]
     first = _shortest_peak(Q, value)
     if first is None:
         return None
+    first = _climbed(ball, taper, first, 0.5 / radius)
     across = np.abs(Q @ first) < _SQUARE * np.linalg.norm(Q, axis=1) * np.linalg.norm(first)
     second = _shortest_peak(Q[across], value[across])
     if second is None:
         return None
+    second = _climbed(ball, taper, second, 0.5 / radius)
     third = np.cross(first, second)
     third = third / np.linalg.norm(third)
     scan = np.arange(least, 4 / cell, 0.25 / radius)
     lean = _coherence(ball, taper, scan[:, None] * third)
     best = _shortest_peak(scan[:, None] * third, np.where(lean > _PEAK, lean, 0.0))
-    return None if best is None else np.array([first, second, best])
+    if best is None:
+        return None
+    return np.array([first, second, _climbed(ball, taper, best, 0.5 / radius)])
+
+
+def _climbed(ball: Floats, taper: Floats, wave: Floats, step: float) -> Floats:
+    """Return the wave vector of greatest coherence near one, by steps halved to nothing."""
+    around = np.stack(np.meshgrid(*[(0.0, -1.0, 1.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    for _ in range(_HALVINGS):
+        tried = wave + step * around
+        wave, step = tried[_coherence(ball, taper, tried).argmax()], step / 2
+    return wave
 
 
 def _coherence(ball: Floats, taper: Floats, waves: Floats) -> Floats:

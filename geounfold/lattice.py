@@ -27,6 +27,7 @@ Coordinates written with 2 decimals for 2.5 m blocks are off by up to 0.003 step
 """
 
 _DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10)  # finer steps tried: sub-blocks in a parent block
+_PARTS = (1, 2, 4)  # of the steps first seen, tried in turn
 _SEEDS, _BALL, _CENTRAL = 6, 1000, 30  # places looked at, points at each, points compared
 _LOOSE = 0.15  # in steps: points that take part in a fit before its last
 _SAMPLED = 200_000  # points beyond which point_spacing looks at a part of them
@@ -102,10 +103,15 @@ def measure_lattice(points: Floats) -> Lattice | None:
     guess = _directions(balls)
     if guess is None:
         return None
-    fit: Fit | None = Fit(guess[0], guess[1], _anchor(balls[0], *guess))
-    for sample in _growing(balls):
-        fit = refit(sample, fit, _LOOSE) if fit else None
-    return _accepted(X, fit, reference) if fit else None
+    for part in _PARTS:  # steps of parents, where sub-blocks are too few to show theirs
+        axes, steps = guess[0], guess[1] / part
+        fit: Fit | None = Fit(axes, steps, _anchor(balls[0], axes, steps))
+        for sample in _growing(balls):
+            fit = refit(sample, fit, _LOOSE) if fit else None
+        found = _accepted(X, fit, reference) if fit else None
+        if found is not None:
+            return found
+    return None
 
 
 def lattice_indices(points: Floats, lattice: Lattice, origin: Floats | None = None) -> Ints:

@@ -25,7 +25,7 @@ from geounfold.mesh import Bools, Floats, Ints
 MOST_CELLS = 250_000
 """Cells beyond which parents are filled by coarser ones; about ten seconds' work."""
 
-SURROUNDED = 21
+SURROUNDED = 22
 """Of a place's 26 neighbours, the least number of blocks that make it a missing block.
 
 Beside a plane of any direction a place outside has 13 at most, in a gap one block wide 18;
@@ -34,7 +34,7 @@ inside have fewer neighbours themselves, and the number is lowered in proportion
 """
 
 _LARGE = 0.01  # share of the blocks from which a part of the body counts
-_ROUNDS = 10  # of filling: a filled place may surround the next
+_ROUNDS = 2  # of filling: more would run along a gap from its end, where a place has 21
 _DOUBLINGS = 5  # of the finest side, tried for the parents' side
 _ODD = 0.01  # share of the blocks that may contradict the sides inferred
 _SEEN = 0.002  # share of the aligned differences that a side must make up

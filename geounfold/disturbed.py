@@ -19,8 +19,8 @@ from geounfold.mesh import Floats
 CLEAR = 0.3
 """Least coherence of all points along each axis: noise of 0.25 steps."""
 
-_PEAK = 0.12  # least coherence of the first points; 2,500 at random reach 0.09
-_BALL = 2500  # points around the place where the search starts
+_PEAK = 0.12  # least coherence of the first points; 4,000 at random reach 0.07
+_BALL = 4000  # points around the place where the search starts
 _NODES = 128  # per axis of the transform's grid
 _HALVINGS = 12  # of the step towards a peak: to 1/4000 of its width
 _TRIED = 2000  # nodes of the transform whose coherence is taken without the grid, at most

@@ -222,7 +222,7 @@ def test_scattered_points_know_neither_row_order_nor_place():
         np.abs(gu.unfold(body.folded[order]).points - first[order]).max() < 1e-6 * 500
     )  # of the size
     # A tilt keeps the top on top; lengths are then compared, as the flat frame may turn.
-    moved = gu.unfold(body.folded + [5e5, 6e6, 0]).points
+    moved = gu.unfold(body.folded + np.array([5e5, 6e6, 0])).points
     assert gu.aligned_rms(moved, first) < 1e-6 * 500
 
 

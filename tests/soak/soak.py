@@ -9,7 +9,8 @@ Bodies are ``geounfold.synthetic.random_body(seed)`` for seeds from --seed on; -
 again, here and with a traceback.  Every body ends as one of
 
   ok           unfolded, and its map is proved to be one-to-one
-  uncertified  unfolded, without that proof
+  uncertified  unfolded with ``allow_uncertified`` alone: without that proof, or with blocks torn
+               from their neighbours or without an image
   refused      an error that geounfold raises on purpose; the right end of a closed tube
   crash        anything else: another exception, a wrong answer (coordinates that are not finite,
                a tube unfolded as a sheet), a process killed, over --seconds or over --memory
@@ -101,37 +102,39 @@ def measure(row: Row, body: Any, u: Any) -> None:
     import geounfold as gu
 
     side = float(np.cbrt(body.sizes.prod(axis=1).mean()))
-    columns = u.columns
-    if not all(np.isfinite(x).all() for x in (u.points, u.stratigraphic)):
+    placed = u.carried.placed
+    if not np.isfinite(u.points[placed]).all() or not np.isfinite(u.stratigraphic[placed]).all():
         row.reason = "coordinates that are not finite"
         return
-    stretch = np.maximum(columns["stretch_max"] - 1, 1 - columns["stretch_min"])
-    level, truth = u.stratigraphic, body.stratigraphic
+    columns = u.columns
+    stretch = np.maximum(columns["stretch_max"] - 1, 1 - columns["stretch_min"])[placed]
+    level, truth = u.stratigraphic[placed], body.stratigraphic[placed]
     # A body that was turned over has its top where its truth has the bottom.
     off = min((level - truth, 1 - level - truth), key=lambda d: float(np.abs(d).mean()))
-    height = np.abs(off) * (body.top - body.bottom)
-    row.epsilon = float(gu.epsilon(body.truth, u.points).mean())
-    row.rms = float(gu.aligned_rms(u.points, body.truth)) / side
+    height = np.abs(off) * (body.top - body.bottom)[placed]
+    row.epsilon = float(gu.epsilon(body.truth[placed], u.points[placed]).mean())
+    row.rms = float(gu.aligned_rms(u.points[placed], body.truth[placed])) / side
     row.strain = float(np.median(stretch))
     row.horizon = float(height.mean()) / side
     row.outside = float(u.outside_share)
-    row.inverted = u.certificate["inverted_folded"] + u.certificate["inverted_unfolded"]
+    row.inverted = u.certificate.inverted_folded + u.certificate.inverted_unfolded
     row.torn = u.summary()["torn"]
     row.round_trip = float(u.round_trip_max) / side
     if body.sheet.spec.closed:
         row.reason = "a closed tube was unfolded"
         return
-    row.outcome = "ok" if u.certificate["injective"] else "uncertified"
-    row.reason = "" if row.outcome == "ok" else failing(row)
+    row.reason, row.message = failing(row, u)
+    row.outcome = "uncertified" if row.reason else "ok"
 
 
-def failing(row: Row) -> str:
-    """Return what keeps a map from its proof."""
-    if row.inverted:
-        return "inverted tetrahedra"
+def failing(row: Row, u: Any) -> tuple[str, str]:
+    """Return why ``unfold`` would have refused this answer unless told to allow it, or nothing."""
+    if not u.certificate.injective:
+        return "not proved", "; ".join(u.certificate.faults)
     if row.torn:
-        return "torn blocks"
-    return "round trip" if row.round_trip > 1e-6 else "not proved"
+        return "torn blocks", f"{row.torn} blocks"
+    unplaced = int((~u.carried.placed).sum())
+    return ("blocks without image", f"{unplaced} blocks") if unplaced else ("", "")
 
 
 def worker(pipe: Connection, row: Row, options: dict[str, Any], memory: int) -> None:

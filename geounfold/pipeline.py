@@ -33,7 +33,7 @@ from geounfold.lattice import Lattice, measure_lattice
 from geounfold.mapping import Carried, UnfoldingMap, checked_points
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 from geounfold.options import UnfoldOptions
-from geounfold.quality import Quality, assess, epsilon
+from geounfold.quality import SUSPECT, Quality, assess, torn_blocks
 from geounfold.solid import solid_cells
 
 Progress = Callable[[str], None]
@@ -137,7 +137,7 @@ def unfold(
     with clock.stage("quality"):
         world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
         quality = assess(world, whole, carried.element, P, carried.points, chosen.neighbours)
-        torn = _torn(groups, P, carried.points, quality, chosen.neighbours)
+        torn = _torn(groups, work, carried, quality, frame)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
     return Unfolding(
@@ -162,24 +162,16 @@ def _sorted(points: Floats) -> Floats:
     return points[np.lexsort(points.T[::-1])]
 
 
-TORN = 1.0
-"""Neighbour distance error from which a block counts as torn from its neighbours.
-
-Measured: at most 0.52 on 28 sound unfoldings, overturned ones included; above 1 for hundreds
-of blocks where a mid surface had run into another limb.
-"""
-
-
 def _torn(
-    groups: Sequence[Ints], folded: Floats, unfolded: Floats, quality: Quality, neighbours: int
+    groups: Sequence[Ints], work: Floats, carried: Carried, quality: Quality, frame: Frame
 ) -> Ints:
-    """Return the rows whose neighbours in their own body came to lie far away."""
-    if len(groups) == 1 and len(groups[0]) == len(folded):
-        return np.flatnonzero(quality.blocks.nmd_error > TORN)
+    """Return the rows whose touching blocks in their own body came to lie far away."""
+    flat = carried.points / frame.scale
     found = []
     for group in groups:
-        rows = group[np.isfinite(unfolded[group, 0])]
-        found.append(rows[epsilon(folded[rows], unfolded[rows], neighbours) > TORN])
+        rows = group[carried.placed[group]]
+        suspects = np.flatnonzero(quality.blocks.nmd_error[rows] > SUSPECT)
+        found.append(rows[torn_blocks(work[rows], flat[rows], frame.sides, suspects)])
     return np.concatenate(found)
 
 

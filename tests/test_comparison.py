@@ -23,8 +23,11 @@ CLOSED = TriMesh(
 def test_one_row_per_surface_and_flattener():
     table = compare({"square": SQUARE, "tent": TENT})
     assert list(table.columns) == list(COLUMNS)
-    assert len(table) == 2 * len(FLATTENERS)
-    assert set(table.flattener) == set(FLATTENERS)
+    # All but those that call what is no free software, which run only where they are named.
+    free = {name for name, flattener in FLATTENERS.items() if flattener.free}
+    assert free == set(FLATTENERS) - {"scaf"}
+    assert len(table) == 2 * len(free)
+    assert set(table.flattener) == free
     assert (table.error == "").all()
     assert (table.flips == 0).all()
     assert (table.seconds > 0).all()

@@ -23,6 +23,7 @@ from geounfold.quality import (
     nmd,
     random_pairs,
     spacing_ratios,
+    torn_blocks,
 )
 
 # Sums of 26 square roots of numbers near 1: a few units in the last place.
@@ -192,6 +193,20 @@ def test_a_block_without_an_image_has_no_figures_and_disturbs_no_others():
     # Nothing has moved, so that nothing but the missing block could change a distance.
     assert q.nmd.max < ROUNDING
     assert q.volume_change.max < ROUNDING
+
+
+def test_torn_blocks_are_those_that_part_from_what_they_touch():
+    k = np.stack(np.meshgrid(np.arange(10), np.arange(6), np.arange(4), indexing="ij"), -1)
+    blocks = k.reshape(-1, 3) * [1.0, 1.0, 0.5]
+    sides, every = np.array([1.0, 1.0, 0.5]), np.arange(len(blocks))
+    sheared = blocks + np.outer(blocks[:, 2], [3.0, 0, 0])  # slip of 3 radians draws to 3.2 times
+    assert not len(torn_blocks(blocks, sheared, sides, every))
+    parted = blocks + np.outer(blocks[:, 0] > 4.5, [20.0, 0, 0])
+    torn = torn_blocks(blocks, parted, sides, every)
+    assert sorted(torn) == np.flatnonzero(np.abs(blocks[:, 0] - 4.5) < 1).tolist()
+    # Two limbs with a gap of 1.6 blocks between them may part as far as they like.
+    limbs = blocks + np.outer(blocks[:, 0] > 4.5, [0.6, 0, 0])
+    assert not len(torn_blocks(limbs, parted, None, every))
 
 
 # --- what is refused

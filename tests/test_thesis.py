@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 from geounfold import thesis
-from geounfold.backends.igl import TetIndex
+from geounfold.backends.igl import TetIndex, barycentric_in_tets
 from geounfold.errors import (
     ControlMeshError,
     InputError,
@@ -127,8 +127,8 @@ def carried(control, P):
     index = TetIndex(control.folded.V, control.folded.T)
     element = index.locate(P)
     assert (element >= 0).all()
-    share = index.barycentric(P, element)
     corner = control.folded.T[element]
+    share = barycentric_in_tets(P, control.folded.V, corner)
     return (
         np.einsum("ij,ijk->ik", share, control.unfolded.V[corner]),
         np.einsum("ij,ij->i", share, control.stratigraphic[corner]),

@@ -60,6 +60,8 @@ class Flattener:
     keeps : str
         What it keeps where the surface allows that, and nearly keeps elsewhere: ``lengths``,
         ``angles``, or ``nothing`` but neighbourhood.
+    free : bool
+        Whether all it calls is free software; what is not runs only where it is named.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Flattener:
     intrinsic: bool
     options: type
     keeps: str = "lengths"
+    free: bool = True
 
 
 #: The methods by name.
@@ -78,7 +81,7 @@ FLATTENERS: dict[str, Flattener] = {
         Flattener("arap", arap, False, ArapOptions),
         Flattener("lscm", lscm, False, LscmOptions, "angles"),
         Flattener("slim", slim, False, SlimOptions),
-        Flattener("scaf", scaf, False, ScafOptions),
+        Flattener("scaf", scaf, False, ScafOptions, free=False),  # calls Triangle
         Flattener("mds", mds, False, MdsOptions),
         Flattener("harmonic", harmonic, False, HarmonicOptions, "nothing"),
     )
@@ -124,7 +127,7 @@ def flatten(
         no two border edges meeting, by exact predicates, suffice (Lipman 2014, arXiv
         1310.0955).  ``note`` says what had to be done: the vertices about a few folded
         triangles moved (Garanzha et al. 2021, arXiv 2102.03069); or, for methods that keep
-        lengths, libigl's SLIM or scaffold maps from Tutte's embedding instead.
+        lengths, libigl's SLIM from Tutte's embedding instead.
 
     Raises
     ------

@@ -14,7 +14,6 @@ from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._untangle import untangle
 from geounfold.flattening.initial import tutte
 from geounfold.flattening.measures import symmetric_dirichlet
-from geounfold.flattening.scaf import scaffold_run
 from geounfold.mesh import Floats
 
 #: When the descents of the ladder stop: their energy then is within a few per cent of its least.
@@ -27,8 +26,9 @@ def one_to_one(problem: Problem, flat: Flattening, isometric: bool) -> Flattenin
     1. *Untangling*: the vertices about a few turned triangles are moved, all others stay.
     2. *SLIM* from Tutte's embedding, for isometric methods and the mesh's own lengths alone;
        nothing flips.
-    3. *Scaffold maps* from the last one-to-one step of 2, where its border came to overlap;
-       where they cannot go on, that step itself.
+    3. The last one-to-one step of 2, where its border came to overlap.  Scaffold maps would go
+       on from there, but their mesh around the surface is Triangle's, which is not free
+       software: ``scaf`` is there for those who may use it.
 
     The answer keeps its method's name; its note says what was done.
 
@@ -74,13 +74,9 @@ def _rungs(problem: Problem, flat: Flattening, isometric: bool) -> Iterator[Flat
     run, sound = _slim_run(problem, uv)
     note = "; ".join(filter(None, ["SLIM from Tutte's embedding instead", run.note]))
     yield finish(problem, run.uv, "", run.stop, run.steps, run.history, note)
-    try:
-        scaffold = scaffold_run(problem, sound, _ENOUGH)
-    except FlatteningError as err:
-        scaffold = Run(sound, 0, Stop.STALLED, _one_record(problem, sound), f"{err}")
-    note = "; ".join(filter(None, ["scaffold maps from SLIM's last sound step", scaffold.note]))
-    steps = run.steps + scaffold.steps
-    yield finish(problem, scaffold.uv, "", scaffold.stop, steps, scaffold.history, note)
+    note = "SLIM's last step before its border overlapped"
+    history = _one_record(problem, sound)
+    yield finish(problem, sound, "", Stop.STALLED, run.steps, history, note)
 
 
 def _slim_run(problem: Problem, uv: Floats) -> tuple[Run, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from geounfold.backends import igl as _igl
 from geounfold.cloud import scattered
-from geounfold.errors import HullError, OptionError
+from geounfold.errors import BackendError, HullError, OptionError
 from geounfold.geometry import face_normals, triangle_areas
 from geounfold.hull._finish import HullOptions
 from geounfold.hull._result import Hull
@@ -83,7 +83,7 @@ def _first_suitable(
     for name, make in makers.items():
         try:
             hull = make(points, sides, options)
-        except HullError as error:
+        except (HullError, BackendError) as error:
             refused.append(f"{name}: {error}")
             continue
         fault = unsuitability(hull, points)

@@ -30,7 +30,8 @@ class HorizonOptions:
     rim, where hulls are rounded; ``misfit``: largest departure from the half thickness;
     ``stiffness``: pull towards the half thickness where there are no samples; ``separate``:
     smoothing length of what the sites add; ``margins``: softness of the separation, round by
-    round; ``blurred``: half thickness up to which the hull's heights are not used.
+    round; ``blurred``: half thickness up to which the hull's heights are not used; from one
+    block more they are.
     """
 
     smooth: float = 1.5
@@ -38,8 +39,8 @@ class HorizonOptions:
     erosion: float = 0.5
     misfit: float = 2.5
     stiffness: float = 1e-4
-    separate: float = 1.5
-    margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.03)
+    separate: float = 2.0
+    margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
     blurred: float = 2.0
 
 
@@ -141,10 +142,12 @@ def separate_horizons(
     nodes, _ = fitted.sheet.samples()
     held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
     still = (options.separate / grid.step) ** 4 * grid.energy(2) + options.stiffness * held
-    thin = float(np.median(grid.value(fitted.half, fitted.near))) <= options.blurred
-    start = (hull.top, -hull.bottom)
-    if thin:
-        start = (fitted.reach(1.0, fitted.half), fitted.reach(-1.0, fitted.half))
+    sharp = [fitted.reach(side, fitted.half) for side in (1.0, -1.0)]
+    trust = np.clip(fitted.half - options.blurred, 0.0, 1.0)
+    start = (
+        sharp[0] + trust * (hull.top - sharp[0]),
+        sharp[1] + trust * (-hull.bottom - sharp[1]),
+    )
     reach = start
     places = Places.of(fitted, sites, occupancy)
     places.follow(fitted.sheet, reach, fitted.slip, steps=1)

@@ -8,7 +8,7 @@ blurred, and there it is the sharpened half thickness that does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class HorizonOptions:
     ``stiffness``: pull towards the half thickness where there are no samples; ``separate``:
     smoothing length of what the sites add; ``margins``: softness of the separation, round by
     round; ``blurred``: half thickness up to which the hull's heights are not used; from one
-    block more they are.
+    block more they are; ``thinnest``: half thickness below which sites are left alone.
     """
 
     smooth: float = 1.5
@@ -39,9 +39,10 @@ class HorizonOptions:
     erosion: float = 0.5
     misfit: float = 2.5
     stiffness: float = 1e-4
-    separate: float = 2.0
+    separate: float = 1.5
     margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
     blurred: float = 2.0
+    thinnest: float = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +150,7 @@ def separate_horizons(
         sharp[1] + trust * (-hull.bottom - sharp[1]),
     )
     reach = start
+    occupancy = replace(occupancy, thinnest=options.thinnest)
     places = Places.of(fitted, sites, occupancy)
     places.follow(fitted.sheet, reach, fitted.slip, steps=1)
     for margin in options.margins:

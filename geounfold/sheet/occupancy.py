@@ -41,7 +41,8 @@ class OccupancyOptions:
     is, round by round; ``thin``, ``cover``: where the half thickness is at most ``thin``, that
     is anywhere below the horizon but farther than ``cover`` along the sheet from any block;
     ``band``: largest distance of a site from its horizon; ``thinnest``, ``taper``: half
-    thickness below which, and its slope above which, sites are left alone; ``slack``: how far
+    thickness (or half of its median, where that is less) below which, and its slope above
+    which, sites are left alone; ``slack``: how far
     sites past those limits are followed all the same, as the sheet moves; ``misfit``: mean
     depth on the wrong side above which the first fit is kept.
     """
@@ -58,7 +59,7 @@ class OccupancyOptions:
     band: float = 1.2
     thin: float = 1.25
     cover: float = 0.9
-    thinnest: float = 0.25
+    thinnest: float = 1.0
     taper: float = 0.25
     slack: float = 0.5
     misfit: float = 0.01
@@ -103,7 +104,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     options : OccupancyOptions
         See there.
     """
-    fitted = _held_open(fitted, options)
+    fitted, options = _for_thin(fitted, options)
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     places = Places.of(fitted, sites, options)
     rough, fine = grid.energy(4), grid.energy(3)
@@ -129,16 +130,20 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
 
 
-def _held_open(fitted: FittedSheet, options: OccupancyOptions) -> FittedSheet:
-    """Return a thin sheet with a half thickness of at least half its median.
+def _for_thin(
+    fitted: FittedSheet, options: OccupancyOptions
+) -> tuple[FittedSheet, OccupancyOptions]:
+    """Return fit and options so that sites of a thin sheet are listened to everywhere.
 
     The hull of a thin sheet ends in a wide rim, over which the half thickness was continued;
-    where it came to nothing no site would be listened to.
+    where it came to nothing it is raised to half its median.  A thick sheet's own thin parts,
+    where it pinches out, are left to its rim.
     """
-    median = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near)))
-    if median > options.thin:
-        return fitted
-    return replace(fitted, half=np.maximum(fitted.half, median / 2))
+    least = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near))) / 2
+    options = replace(options, thinnest=min(options.thinnest, least))
+    if 2 * least > options.thin:
+        return fitted, replace(options, thin=0.0)
+    return replace(fitted, half=np.maximum(fitted.half, 1.01 * least)), options
 
 
 def clearance(margin: float) -> float:

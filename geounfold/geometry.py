@@ -174,3 +174,23 @@ def bilateral_normals(mesh: TriMesh, adjacency: Ints, sweeps: int, width: float 
         weight = np.exp((cos - 1) / width) * area[near]
         N = unit(N * area[:, None] + np.einsum("ij,ijk->ik", weight, N[near]))
     return N
+
+
+def corner_angles(V: Floats, F: Ints) -> Floats:
+    """Return the angle at each corner of each triangle, radians, (m, 3)."""
+    out = np.empty(F.shape)
+    for k in range(3):
+        a, b = V[F[:, (k + 1) % 3]] - V[F[:, k]], V[F[:, (k + 2) % 3]] - V[F[:, k]]
+        out[:, k] = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    return out
+
+
+def loop_turning(V: Floats, F: Ints, loop: Ints) -> float:
+    """Return by how much a boundary loop of a surface turns inwards in all, radians.
+
+    The sum of pi less the surface's angle at every vertex of the loop (k,): the total geodesic
+    curvature.  Over a surface that can be laid flat it is 2 pi on the outer loop and -2 pi
+    around a hole (Gauss-Bonnet); a cylinder's ends turn by 0.
+    """
+    at = np.bincount(F.ravel(), corner_angles(V, F).ravel(), len(V))
+    return float((np.pi - at[loop]).sum())

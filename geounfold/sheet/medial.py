@@ -10,10 +10,11 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from geounfold.backends.igl import face_components, pinched_vertices
-from geounfold.errors import SplitError
+from geounfold.backends.igl import boundary_loops, face_components, pinched_vertices
+from geounfold.errors import NoSheetError, SplitError
 from geounfold.geometry import (
     bilateral_normals,
+    loop_turning,
     triangle_areas,
     unit,
     vertex_normals,
@@ -75,6 +76,24 @@ class MedialSheet:
     trusted: Bools
     core_faces: Bools
     normals: Floats
+
+
+def _check_open(mesh: TriMesh) -> None:
+    """Raise NoSheetError where a surface closes on itself, as a tube does.
+
+    A pierced sheet has several boundary loops too, but its outer one turns by about 2 pi; of a
+    surface closed around an axis every loop runs around it and turns by about nothing.
+    """
+    loops = boundary_loops(mesh.F)
+    if len(loops) == 1:
+        return
+    if loops and max(loop_turning(mesh.V, mesh.F, loop) for loop in loops) > np.pi:
+        return
+    what = "around an axis" if loops else "on all sides"
+    raise NoSheetError(
+        f"the layer closes on itself {what}, so it has no flat image without a cut; leave out a "
+        "row of blocks along a cut, or unfold its parts one by one"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +192,8 @@ def medial_sheet(
     ------
     SplitError
         No top face has a parallel bottom opposite it.
+    NoSheetError
+        The top closes on itself.
     """
     mesh = split.mesh
     centres = mesh.V[mesh.F].mean(axis=1)
@@ -183,6 +204,7 @@ def medial_sheet(
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
     medial = TriMesh(part.V - half[:, None] * inward, part.F if outward else part.F[:, ::-1])
+    _check_open(medial)
     uv = flatten(medial, None)
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))

@@ -38,6 +38,8 @@ AHEAD = 0.866  # ... if it lies within 30 degrees of the inward normal
 NORMAL_THRESHOLD = 0.3  # |normal's component along up| above which a face is top or bottom
 DECISIVE = 0.05  # |mean cosine| of the top's normals along an axis that decides which is top
 MIN_EXTENT = 4.5  # area of a side over the squared thickness below which there is no sheet ...
+MIN_PARTED = 2.5  # ... the same where flanks are told from the sides ...
+FLANKED = 0.15  # ... (share of the hull from which flanks are) ...
 MIN_LENGTH = 5.0  # ... unless it is a strip of so many thicknesses in length
 RIDGE_COSINE = 0.9  # smoothed normals' cosine below which a ridge parts two sides of a body
 LOOKS_BACK = 0.85  # faces of a pair of sides are opposite when smoothed -N.N' exceeds this
@@ -537,11 +539,18 @@ def side_length(result: SurfaceSplit) -> float:
 def check_sheet(result: SurfaceSplit) -> None:
     """Raise NoSheetError where a side is too small for its thickness: a ball, a cube.
 
-    A strip no wider than it is thick is small too, but long.
+    Where ridges part the sides from flanks they are told from them by more than size, and the
+    least extent is MIN_PARTED, flanks left out; a strip no wider than it is thick may be long
+    instead.
     """
     extent = min(side_extent(result))
-    if extent >= MIN_EXTENT or (extent >= 1 and side_length(result) >= MIN_LENGTH):
+    if extent >= MIN_EXTENT:
         return
+    area = triangle_areas(result.mesh.V, result.mesh.F) / result.median_thickness**2
+    if area[result.beyond].sum() > FLANKED * area.sum():
+        parted = min(float(area[(result.side == s) & ~result.beyond].sum()) for s in (1, -1))
+        if parted >= MIN_PARTED or (parted >= 1 and side_length(result) >= MIN_LENGTH):
+            return
     raise NoSheetError(
         "the body has no two opposite surfaces to flatten: each covers only "
         f"{extent:.1f} times its thickness squared (a sheet has at least {MIN_EXTENT:g}, or a "

@@ -47,7 +47,7 @@ class FitOptions:
     weak: float = 1e-4
     unseen: float = 3e-4
     rounds: int = 4
-    agree: float = 0.95
+    agree: float = 0.93
     first: float = 1.5
     later: float = 1.0
     erosion: float = 1.5

@@ -136,9 +136,9 @@ def test_upright_prisms_may_overlap_at_an_inner_hinge():
     """Offsets up to nine tenths of the focal distance, dipping there from one cell to the next.
 
     In early trials 8 blocks of a real body lay in two tetrahedra at an inner hinge, every volume
-    positive in both spaces.  Here it is a hinge of radius 48 at a half-thickness of 40.
+    positive in both spaces.  Here it is a hinge of radius 42 at a half-thickness of 40.
     """
-    body = gu.simulate("tight_hinge")
+    body = gu.simulate("sharp_hinge")
     u = gu.unfold(body.folded)
     assert u.certificate.injective
     fit, options = u.fits[0].sheet, ControlOptions()

@@ -1,5 +1,7 @@
 """The rungs that mend a control mesh: untangling, bounded slopes, tents, pinched footprints."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import check_grad
@@ -135,20 +137,24 @@ def test_the_ladder_records_what_every_rung_gave(plunging):
     def rung(offset):
         return columns, columns.layers(np.full((2, columns.count), offset), FRACTIONS)
 
-    # 40 blocks are past the focal distance of the hinges (12 blocks): turned inside out.
+    # 40 blocks are past the focal distance of the hinges (12 blocks): turned inside out.  Where
+    # that is so, offsets fall back to the horizons, 5 blocks away.
     climbed = climb([("far", lambda: rung(40.0)), ("near", lambda: rung(5.6))], points, 3)
     assert climbed.proved
-    names = [r.name for r in climbed.rungs]
-    assert names[0] == "far"
-    assert names[-1] == "near"
-    assert climbed.rungs[0].inverted_folded > 0
-    assert climbed.rungs[-1].flaws == climbed.rungs[-1].lost == 0
+    first, second = climbed.rungs
+    assert (first.name, second.name) == ("far", "blended")
+    assert first.inverted_folded > 0
+    assert second.flaws == second.lost == 0
+    assert climbed.laid.layers.up.max() < 40
+    assert climbed.laid.layers.up.min() >= 4.9
 
 
 def test_what_cannot_be_proved_is_given_back_unproved(plunging):
     columns, points = columns_of(plunging)
-    offsets = np.full((2, columns.count), 40.0)
-    climbed = climb([("far", lambda: (columns, columns.layers(offsets, FRACTIONS)))], points, 1)
+    # Every other normal looks down: whatever the offsets, prisms are twisted.
+    twisted = replace(columns, normal=columns.normal * (-1.0) ** np.arange(len(columns.P))[:, None])
+    layers = twisted.layers(np.full((2, columns.count), 5.0), FRACTIONS)
+    climbed = climb([("twisted", lambda: (twisted, layers))], points, 1)
     assert not climbed.proved
-    assert climbed.rungs[-1].name == "shrunk"
-    assert climbed.rungs[-1].flaws > 0
+    assert [rung.name for rung in climbed.rungs] == ["twisted", "blended", "untangled", "shrunk"]
+    assert all(rung.flaws > 0 for rung in climbed.rungs)

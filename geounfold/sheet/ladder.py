@@ -125,7 +125,9 @@ def climb(
     Parameters
     ----------
     rungs : iterable of (name, callable)
-        What to try, in order; each callable returns columns and offsets on them.
+        What to try, in order; each callable returns columns and offsets on them.  Of several by
+        one name each reaches farther than the one before: where that could not be proved or
+        mended, the next is not tried.
     points : (n, 3) float
         The blocks, working units.
     shrinks : int
@@ -134,7 +136,10 @@ def climb(
     records: list[Rung] = []
     held: list[tuple[int, int, int, Columns, Laid]] = []
     flawed: list[tuple[int, int, Columns, Layers, _Exam]] = []
+    hopeless: set[str] = set()
     for name, make in rungs:
+        if name in hopeless:
+            continue
         columns, layers = make()
         laid, exam = _proved(columns, layers)
         records.append(exam.rung(name))
@@ -149,6 +154,7 @@ def climb(
                 laid, rung = _untangled(columns, layers, exam)
             records.append(rung)
         if laid is None:
+            hopeless.add(name)
             continue
         laid, outside, lost = _covering(laid, points)
         records[-1] = replace(records[-1], outside=outside, lost=lost)

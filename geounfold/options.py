@@ -22,6 +22,16 @@ METHODS = ("sheet", "thesis")
 """Methods for whole bodies: ours, and the thesis's."""
 
 
+VALID: dict[str, tuple[str, ...]] = {
+    "method": METHODS,
+    "flattener": tuple(FLATTENERS),
+    "hull": ("auto", *HULLS),
+    "split": tuple(SPLITS),
+    "datum": DATUMS,
+}
+"""Valid values of the options that have names for them."""
+
+
 def _one_of(name: str, value: str, valid: Iterable[str]) -> None:
     valid = tuple(valid)
     if value not in valid:
@@ -83,11 +93,8 @@ class UnfoldOptions:
     thesis_options: ThesisOptions = field(default_factory=ThesisOptions)
 
     def __post_init__(self) -> None:
-        _one_of("method", self.method, METHODS)
-        _one_of("flattener", self.flattener, FLATTENERS)
-        _one_of("hull", self.hull, ("auto", *HULLS))
-        _one_of("split", self.split, SPLITS)
-        _one_of("datum", self.datum, DATUMS)
+        for name, valid in VALID.items():
+            _one_of(name, getattr(self, name), valid)
         up = np.asarray(self.up, dtype=np.float64)
         if up.shape != (3,) or not np.isfinite(up).all() or not up.any():
             raise OptionError(f"up must be three finite numbers, not all zero, but is {self.up}")

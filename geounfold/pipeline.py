@@ -20,6 +20,7 @@ from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.bodies import check_points, count_duplicates, select_body, separate_bodies
 from geounfold.certificate import Certificate, certify
 from geounfold.cloud import QUIET, unevenness
+from geounfold.config import to_toml
 from geounfold.control import ControlMesh, scaled, side_by_side
 from geounfold.disturbed import disturbed_lattice
 from geounfold.errors import ControlMeshError, InputError
@@ -415,6 +416,7 @@ class Unfolding:
         return {
             "version": __version__,
             "options": self.options.as_dict(),
+            "config": to_toml(self.options),
             "points": len(self.folded),
             "bodies": len(self.fits),
             "lattice": self._lattice_summary(),

@@ -27,6 +27,7 @@ from geounfold.frame import Frame
 from geounfold.mesh import TetMesh
 
 COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
+COMMANDS += ["init", "doctor", "completion"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
 PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
 RESULTS = [*PLACE, "location", "mesh_distance"]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,11 +25,12 @@ from geounfold.io import (
 )
 from geounfold.io.coordinates import Triple, parse_columns
 from geounfold.io.formats import point_endings, surface_endings
+from geounfold.io.results import FOLDED, UNFOLDED, result_columns
 from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
-    from geounfold.mapping import Carried, UnfoldingMap
+    from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Floats, TriMesh
     from geounfold.options import UnfoldOptions
 
@@ -38,8 +41,7 @@ _MAP = (".npz",)
 _VTU = (".vtu",)
 _HTML = (".html", ".htm")
 _PICTURE = (".png",)
-_UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
-_FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
+_TOML = (".toml",)
 _TRUE: Triple = ("true_x", "true_y", "true_z")
 _MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours", "reach")
 
@@ -59,7 +61,9 @@ def unfold(args: Namespace, console: Console) -> None:
             "--samples-out": (args.samples_out, _POINTS_OUT),
             "--traces-out": (args.traces_out, TRACE_ENDINGS),
         },
-        _given(args.points, args.samples, args.top, args.bottom, *(args.holes or ())),
+        _given(
+            args.points, args.samples, args.top, args.bottom, _config(args), *(args.holes or ())
+        ),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
@@ -76,12 +80,14 @@ def unfold(args: Namespace, console: Console) -> None:
     from geounfold import pipeline
 
     result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
-    summary = {**result.summary(), "input": table.facts()}
+    summary = {**result.summary(), "input": table.facts(), "command": _command(args)}
     warnings = summary.get("warnings", [])
     if samples is not None:
         summary["samples"] = samples.facts()
-    columns = _columns(_UNFOLDED, result.carried) | result.columns
-    carried = None if samples is None else _columns(_UNFOLDED, result.map.carry(samples.points))
+    columns = result_columns(UNFOLDED, result.carried) | result.columns
+    carried = (
+        None if samples is None else result_columns(UNFOLDED, result.map.carry(samples.points))
+    )
     traced = {} if holes is None else holes.carried(_flat(result.map))
     if holes is not None:
         summary["drillholes"] = holes.facts(traced)
@@ -112,6 +118,7 @@ def unfold(args: Namespace, console: Console) -> None:
     for name, columns in traced.items():
         _warn_of_outside(f"the holes' {name}", columns, console)
     console.done(f"{len(table)} points unfolded into {args.output}")
+    console.answer(summary)
 
 
 def carry(args: Namespace, console: Console) -> None:
@@ -139,7 +146,7 @@ def carry(args: Namespace, console: Console) -> None:
     if args.points is not None and _is_wireframe(args):
         _carry_surface(args, console, outputs)
         return
-    prefer = (_UNFOLDED,) if args.inverse else ()
+    prefer = (UNFOLDED,) if args.inverse else ()
     table = None if args.points is None else _read(args.points, args, console, prefer=prefer)
     holes = read_holes(args, console)
     from geounfold import mapping
@@ -148,10 +155,9 @@ def carry(args: Namespace, console: Console) -> None:
     console.stage("carrying points")
     columns: dict[str, Any] = {}
     if table is not None and args.inverse:
-        columns = _columns(_FOLDED, saved.carry(table.points, inverse=True))
-        del columns["stratigraphic"]
+        columns = result_columns(FOLDED, saved.carry(table.points, inverse=True))
     elif table is not None:
-        columns = _columns(_UNFOLDED, saved.carry(table.points))
+        columns = result_columns(UNFOLDED, saved.carry(table.points))
     traced = {} if holes is None else holes.carried(_flat(saved))
     with outputs.writing() as parts:
         if table is not None:
@@ -165,6 +171,8 @@ def carry(args: Namespace, console: Console) -> None:
     carried = {args.output: columns, args.samples_out: traced.get("samples", {})}
     counts = [f"{len(c['location'])} points carried into {p}" for p, c in carried.items() if c]
     console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
+    named = {"points": columns, **traced}
+    console.answer({name: _places(found) for name, found in named.items() if found})
 
 
 def _is_wireframe(args: Namespace) -> bool:
@@ -192,28 +200,34 @@ def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
         )
     with outputs.writing() as parts:
         write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
-    _warn_of_outside(args.points, _columns(_UNFOLDED, carried), console)
+    _warn_of_outside(args.points, result_columns(UNFOLDED, carried), console)
     console.done(f"{len(mesh.V)} vertices carried into {args.output}")
+    console.answer({"vertices": _places(result_columns(UNFOLDED, carried))})
 
 
 def _flat(saved: UnfoldingMap) -> Callable[[Floats], dict[str, Any]]:
     """Return what carries points to the flat side, into output columns."""
-    return lambda points: _columns(_UNFOLDED, saved.carry(points))
+    return lambda points: result_columns(UNFOLDED, saved.carry(points))
+
+
+def _places(columns: dict[str, Any]) -> dict[str, int]:
+    """Return how many points were carried, and how many of them not by the control mesh."""
+    location = columns["location"]
+    words = ("extrapolated", "outside")
+    return {"carried": len(location), **{w: int(np.count_nonzero(location == w)) for w in words}}
 
 
 def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:
     """Say how many carried points the control mesh does not hold."""
-    location = columns["location"]
-    words = ("extrapolated", "outside")
-    extrapolated, empty = (int(np.count_nonzero(location == word)) for word in words)
+    total, extrapolated, empty = _places(columns).values()
     if extrapolated:
         console.warn(
-            f"{path}: {extrapolated} of {len(location)} points lie outside the control mesh and "
+            f"{path}: {extrapolated} of {total} points lie outside the control mesh and "
             "were carried by its continuation; they are marked extrapolated"
         )
     if empty:
         console.warn(
-            f"{path}: {empty} of {len(location)} points lie farther from the control mesh than "
+            f"{path}: {empty} of {total} points lie farther from the control mesh than "
             "the map reaches; they were left empty and are marked outside"
         )
 
@@ -222,7 +236,7 @@ def compare(args: Namespace, console: Console) -> None:
     """Try flatteners on one body or surface and write a table of how they did."""
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)},
-        [args.points],
+        _given(args.points, _config(args)),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
@@ -243,11 +257,12 @@ def compare(args: Namespace, console: Console) -> None:
     for _, row in frame[frame["error"] != ""].iterrows():
         console.warn(f"{row['flattener']} failed on the {row['surface']} surface: {row['error']}")
     console.done(f"{len(frame)} rows written into {args.output}")
+    console.answer({"rows": frame.astype(object).where(frame.notna(), None).to_dict("records")})
 
 
 def _refuse_model_options(args: Namespace) -> None:
     """Raise where options that shape a body's surfaces are given beside a surface."""
-    given = [f"--{name}" for name in _MODEL if hasattr(args, name)]
+    given = [f"--{name}" for name in (*_MODEL, "config") if hasattr(args, name)]
     if given:
         raise OptionError(f"{given[0]} needs a table of points; {args.points} is one surface")
 
@@ -261,7 +276,7 @@ def quality(args: Namespace, console: Console) -> None:
         watcher=console.journal,
     )
     folded = read_points(args.folded, _triple(args.columns))
-    unfolded = read_points(args.unfolded, _triple(args.unfolded_columns), prefer=(_UNFOLDED,))
+    unfolded = read_points(args.unfolded, _triple(args.unfolded_columns), prefer=(UNFOLDED,))
     truth = None
     if args.truth is not None:
         truth = read_points(args.truth, _triple(args.truth_columns), prefer=(_TRUE,))
@@ -284,7 +299,7 @@ def quality(args: Namespace, console: Console) -> None:
         if "--output" in parts:
             write_json(parts["--output"], figures)
     console.done("measured")
-    console.say("".join(_figure_lines(figures)))
+    console.answer(figures, lambda: "".join(_figure_lines(figures)))
 
 
 def simulate(args: Namespace, console: Console) -> None:
@@ -294,9 +309,8 @@ def simulate(args: Namespace, console: Console) -> None:
     if args.list:
         if args.case is not None or args.output is not None:
             raise OptionError("--list stands alone: it neither takes a CASE nor writes a file")
-        width = max(map(len, synthetic.CASES))
-        lines = [f"{name:<{width}}  {s.description}\n" for name, s in synthetic.CASES.items()]
-        console.say("".join(lines))
+        cases = {name: case.description for name, case in synthetic.CASES.items()}
+        console.answer({"cases": cases}, lambda: _lined_up(cases))
         return
     if args.case is None or args.output is None:
         raise OptionError("simulate needs CASE and -o OUT, or --list")
@@ -312,6 +326,7 @@ def simulate(args: Namespace, console: Console) -> None:
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
     console.done(f"{len(frame)} points written into {args.output}")
+    console.answer({"case": args.case, "points": len(frame), "output": args.output})
 
 
 def view(args: Namespace, console: Console) -> None:
@@ -332,6 +347,40 @@ def view(args: Namespace, console: Console) -> None:
     with outputs.writing() as parts:
         parts["--output"].write_bytes(picture)
     console.done(f"drawn into {args.output}")
+    console.answer({"output": args.output})
+
+
+def init(args: Namespace, console: Console) -> None:
+    """Write every option with its default and what it does, to a file or to stdout."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, _TOML)}, overwrite=args.overwrite, watcher=console.journal
+    )
+    from geounfold.config import template
+
+    if args.output is None:
+        console.say(template())
+        return
+    with outputs.writing() as parts:
+        parts["--output"].write_text(template(), encoding="utf-8")
+    console.done(f"options written into {args.output}")
+    console.answer({"output": args.output})
+
+
+def doctor(args: Namespace, console: Console) -> None:
+    """Say what is installed and whether it works."""
+    from geounfold.cli.checkup import check_up, healthy, in_words
+
+    found = check_up(console.stage)
+    console.done("checked")
+    console.answer(found, lambda: in_words(found))
+    healthy(found)
+
+
+def completion(args: Namespace, console: Console) -> None:
+    """Print what teaches a shell to complete the command line."""
+    from geounfold.cli.completion import script
+
+    console.say(script(args.shell))
 
 
 def _draw_map(path: str, console: Console) -> bytes:
@@ -358,10 +407,10 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
     from geounfold import plotting
 
     console.stage("drawing")
-    for names, title in ((_UNFOLDED, "unfolded"), (_TRUE, "truth")):
+    for names, title in ((UNFOLDED, "unfolded"), (_TRUE, "truth")):
         if set(names) <= set(table.frame.columns) and names != table.columns:
             twin = np.column_stack([table.numbers(name) for name in names])
-            titles = ("unfolded" if table.columns == _UNFOLDED else "folded", title)
+            titles = ("unfolded" if table.columns == UNFOLDED else "folded", title)
             return plotting.png(
                 plotting.draw_bodies(table.points, twin, values, label, titles=titles)
             )
@@ -370,7 +419,7 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
 
 def _default_colour(table: PointTable) -> str:
     """Return the column to colour by: of a result, how high in the layer; else the height."""
-    result = {"stratigraphic", *_UNFOLDED} <= set(table.frame.columns)
+    result = {"stratigraphic", *UNFOLDED} <= set(table.frame.columns)
     return "stratigraphic" if result else table.columns[2]
 
 
@@ -413,19 +462,8 @@ def _read_samples(args: Namespace, console: Console) -> PointTable | None:
     return table
 
 
-def _columns(names: Triple, mapped: Carried) -> dict[str, Any]:
-    """Return where points came to lie, by output column."""
-    points = {name: mapped.points[:, axis] for axis, name in enumerate(names)}
-    return {
-        **points,
-        "stratigraphic": mapped.stratigraphic,
-        "location": mapped.location,
-        "mesh_distance": mapped.distance,
-    }
-
-
 def _options(args: Namespace) -> UnfoldOptions:
-    """Return the options that were given; the pipeline knows the others."""
+    """Return the options given by words and file, words first; the pipeline knows the others."""
     from geounfold.options import UnfoldOptions
 
     readers: dict[str, Callable[[str], Any]] = {
@@ -437,8 +475,32 @@ def _options(args: Namespace) -> UnfoldOptions:
     given = {n: getattr(args, n) for n in _MODEL if hasattr(args, n)}
     values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
     if hasattr(args, "allow_uncertified"):
-        values["allow_uncertified"] = True
-    return UnfoldOptions(**values)
+        values["allow_uncertified"] = args.allow_uncertified
+    path = _config(args)
+    return UnfoldOptions(**values) if path is None else replace(_read_config(path), **values)
+
+
+def _read_config(path: str) -> UnfoldOptions:
+    """Return the options in a TOML file."""
+    from geounfold.config import from_toml
+
+    try:
+        text = existing_file(Path(path)).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OptionError(f"{path}: not valid TOML: not UTF-8 text") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return from_toml(text, path)
+
+
+def _config(args: Namespace) -> str | None:
+    path: str | None = getattr(args, "config", None)
+    return path
+
+
+def _command(args: Namespace) -> str:
+    """Return the command that repeats the run, in a shell's words."""
+    return shlex.join(["geounfold", *args.words])
 
 
 def _direction(text: str) -> tuple[float, float, float]:
@@ -470,6 +532,12 @@ def _count(text: str | None, option: str) -> int | None:
     if not text.isdecimal() or int(text) < 1:
         raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
     return int(text)
+
+
+def _lined_up(texts: dict[str, str]) -> str:
+    """Return names and texts as two columns."""
+    width = max(map(len, texts))
+    return "".join(f"{name:<{width}}  {text}\n" for name, text in texts.items())
 
 
 def _figure_lines(figures: dict[str, Any]) -> list[str]:

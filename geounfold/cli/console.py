@@ -1,13 +1,15 @@
-"""What the command line says on stderr: progress, warnings, one line per error."""
+"""What the command line says: progress, warnings and errors on stderr, answers on stdout."""
 
 from __future__ import annotations
 
 import sys
-import time
-from contextlib import suppress
-from typing import TextIO
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, TextIO, cast
 
+from geounfold.cli.forecast import Forecast
 from geounfold.cli.journal import Journal
+from geounfold.cli.progress import Careful, Progress, progress_on
 from geounfold.errors import OutputError
 
 
@@ -18,6 +20,10 @@ class Console:
     ----------
     quiet : bool, optional
         Neither progress nor warnings.
+    json : bool, optional
+        Answers are JSON.
+    plain : bool, optional
+        Progress that does not mind other lines between (``-v``).
     stream : text stream, optional
         Instead of stderr.
     journal : Journal, optional
@@ -33,26 +39,34 @@ class Console:
         self,
         *,
         quiet: bool = False,
+        json: bool = False,
+        plain: bool = False,
         stream: TextIO | None = None,
         journal: Journal | None = None,
     ) -> None:
         self.journal = journal or Journal()
-        self._stream = sys.stderr if stream is None else stream
-        self._quiet = quiet
+        given = sys.stderr if stream is None else stream
+        self._stream = None if given is None else cast(TextIO, Careful(given))
+        self._quiet, self._json, self._plain = quiet, json, plain
         self._live = not quiet and self._stream is not None and self._stream.isatty()
-        self._since = time.perf_counter()
+        self._shown = False
+        self._forecast = Forecast()
+
+    @cached_property
+    def _progress(self) -> Progress:
+        return progress_on(cast(TextIO, self._stream), self._forecast, plain=self._plain)
 
     def stage(self, name: str) -> None:
         """Show the stage that begins, in place of the one before."""
         if self._live:
-            seconds = time.perf_counter() - self._since
-            self._write(f"\r\x1b[K[{seconds:5.1f} s] {_one_line(name)} ...")
+            self._progress.stage(_one_line(name))
+            self._shown = True
 
     def done(self, text: str) -> None:
         """Say what a run has done, on a terminal."""
         if self._live:
             self._clear()
-            self._write(f"{_one_line(text)} ({time.perf_counter() - self._since:.1f} s)\n")
+            self._write(f"{_one_line(text)} ({self._forecast.elapsed:.1f} s)\n")
 
     def warn(self, text: str) -> None:
         """Say what to distrust; in a pipe too, unless quiet."""
@@ -65,6 +79,28 @@ class Console:
         self._clear()
         self._write(f"geounfold: error: {_one_line(text)}\n")
 
+    def answer(self, facts: dict[str, Any], text: Callable[[], str] | None = None) -> None:
+        """Give an answer on stdout: as one JSON object where that was asked for, else as text.
+
+        Parameters
+        ----------
+        facts : dict
+            What JSON tells.
+        text : callable, optional
+            Makes the text; without, only JSON says anything.
+
+        Raises
+        ------
+        OutputError
+            See `say`.
+        """
+        if self._json:
+            from geounfold.io.tables import json_text
+
+            self.say(json_text(facts))
+        elif text is not None:
+            self.say(text())
+
     def say(self, text: str) -> None:
         """Print an answer on stdout.
 
@@ -73,6 +109,7 @@ class Console:
         OutputError
             It cannot be written where stdout leads; a reader that has left is BrokenPipeError.
         """
+        self._clear()
         if sys.stdout is None:
             return
         try:
@@ -84,15 +121,19 @@ class Console:
             raise OutputError(f"cannot write to stdout: {error.strerror or error}") from error
 
     def _clear(self) -> None:
+        """Take progress away: another line comes; also what a run that was killed left."""
         if self._live:
-            self._write("\r\x1b[K")
+            if self._shown:
+                self._progress.clear()
+            else:
+                self._write("\r\x1b[K")
+            self._shown = False
 
     def _write(self, text: str) -> None:
         """Write a message; one that cannot be shown (stderr closed, full) is no reason to fail."""
         if self._stream is not None:
-            with suppress(OSError, ValueError):
-                self._stream.write(text)
-                self._stream.flush()
+            self._stream.write(text)
+            self._stream.flush()
 
 
 def _one_line(text: str) -> str:

@@ -24,6 +24,19 @@ _NO_MEMORY = re.compile(
     re.IGNORECASE,
 )
 
+_COMMANDS = {
+    "unfold": "unfold",
+    "map": "carry",
+    "compare": "compare",
+    "quality": "quality",
+    "simulate": "simulate",
+    "view": "view",
+    "init": "init",
+    "doctor": "doctor",
+    "completion": "completion",
+}
+"""The commands, and their functions in `commands`."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -47,18 +60,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     return supervised(
         lambda journal, ready: _guarded(words, journal, ready),
         Console(quiet="--quiet" in words),
-        verbose=any(word.startswith(("-v", "--verbose")) for word in words),
+        verbose=_verbose(words),
     )
 
 
 def _guarded(words: Sequence[str], journal: Journal, ready: Callable[[], None]) -> int:
     """Run, and turn every way of ending into a status and a line."""
-    console = Console(quiet="--quiet" in words, journal=journal)
+    console = Console(
+        quiet="--quiet" in words, json="--json" in words, plain=_verbose(words), journal=journal
+    )
     status, line = _outcome(words, console, ready)
     journal.ended(status)
     if line:
         console.error(line)
     return status
+
+
+def _verbose(words: Sequence[str]) -> bool:
+    return any(word.startswith(("-v", "--verbose")) for word in words)
 
 
 def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) -> tuple[int, str]:
@@ -111,10 +130,7 @@ def _run(words: Sequence[str], console: Console) -> None:
     if args.command is None:
         from geounfold.errors import OptionError
 
-        raise OptionError(
-            "a command is needed: unfold, map, compare, quality, simulate or view "
-            "(see 'geounfold --help')"
-        )
+        raise OptionError(f"a command is needed: {', '.join(_handlers())} (see 'geounfold --help')")
     with _logging(args.verbose):
         handlers = _handlers()
         handlers[args.handler](args, console)
@@ -123,14 +139,7 @@ def _run(words: Sequence[str], console: Console) -> None:
 def _handlers() -> dict[str, Callable[..., None]]:
     from geounfold.cli import commands
 
-    return {
-        "unfold": commands.unfold,
-        "map": commands.carry,
-        "compare": commands.compare,
-        "quality": commands.quality,
-        "simulate": commands.simulate,
-        "view": commands.view,
-    }
+    return {name: getattr(commands, function) for name, function in _COMMANDS.items()}
 
 
 @contextmanager

@@ -83,6 +83,16 @@ of W are taken first where they exist. All files must have the same unit."""
 _SIMULATE = """\
 columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z before folding, in
 metres, to four decimals. The same case gives the same file."""
+_DOCTOR = """\
+The exit status is 1 where a library that geounfold needs is missing, is of a version it was not
+made for, or does not work. Libraries of extras may be missing."""
+_COMPLETION = """\
+bash:  geounfold completion bash > ~/.local/share/bash-completion/completions/geounfold
+zsh:   geounfold completion zsh > ~/.zsh/_geounfold    (a folder in fpath)
+tcsh:  geounfold completion tcsh > ~/.geounfold.csh    (and source it from ~/.tcshrc)
+
+Needs: pip install 'geounfold[completion]'"""
+SHELLS = ("bash", "zsh", "tcsh")
 _EXIT = "exit status: 0 done, 2 input or options at fault, 1 anything else, 130 interrupted"
 
 
@@ -99,7 +109,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return the parsed arguments; `handler` names the command's function.
+    """Return the parsed arguments; `handler` names the command's function, `words` is argv.
 
     Raises
     ------
@@ -108,7 +118,9 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     SystemExit
         After ``--help`` and ``--version``, with status 0.
     """
-    return build_parser(holes="--holes" in argv).parse_args(_joined(argv))
+    args = build_parser(holes="--holes" in argv).parse_args(_joined(argv))
+    args.words = list(argv)
+    return args
 
 
 def _joined(argv: Sequence[str]) -> list[str]:
@@ -138,6 +150,9 @@ def build_parser(*, holes: bool = False) -> Parser:
     _add_quality(commands, common)
     _add_simulate(commands, common)
     _add_view(commands, common)
+    _add_init(commands, common)
+    _add_doctor(commands, common)
+    _add_completion(commands, common)
     return parser
 
 
@@ -145,6 +160,9 @@ def _common() -> argparse.ArgumentParser:
     """Return the options that every command has."""
     common = argparse.ArgumentParser(add_help=False)
     group = common.add_argument_group("all commands")
+    group.add_argument(
+        "--json", action="store_true", help="answer on stdout as one JSON object, for machines"
+    )
     group.add_argument("--overwrite", action="store_true", help="replace outputs that exist")
     group.add_argument("--quiet", action="store_true", help="no progress and no warnings")
     group.add_argument(
@@ -186,6 +204,12 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
     """Add the options that become `UnfoldOptions`, and return their group."""
     group = parser.add_argument_group(title)
     given: dict[str, Any] = {"default": argparse.SUPPRESS}
+    group.add_argument(
+        "--config",
+        metavar="C.toml",
+        help="options from a file such as `geounfold init` writes; those given here go before it",
+        **given,
+    )
     group.add_argument(
         "--method", metavar="M", help="sheet (default) or thesis: how the map is made", **given
     )
@@ -250,7 +274,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     _add_holes(parser)
     _add_model(parser).add_argument(
         "--allow-uncertified",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
         default=argparse.SUPPRESS,
         help="write the answer, marked, even where the map is not proved one-to-one",
     )
@@ -378,3 +402,25 @@ def _add_view(commands: Any, common: argparse.ArgumentParser) -> None:
         help="colour by a column of numbers (default stratigraphic, or height)",
     )
     _add_columns(parser)
+
+
+def _add_init(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands, "init", "write all options, with their defaults and what they do", common
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="C.toml", help="for --config; without, they go to stdout"
+    )
+
+
+def _add_doctor(commands: Any, common: argparse.ArgumentParser) -> None:
+    _add_command(
+        commands, "doctor", "tell what is installed, and whether it works", common, _DOCTOR
+    )
+
+
+def _add_completion(commands: Any, common: argparse.ArgumentParser) -> None:
+    parser = _add_command(
+        commands, "completion", "print a script that makes a shell complete", common, _COMPLETION
+    )
+    parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))

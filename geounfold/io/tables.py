@@ -490,8 +490,12 @@ def _typed(column: pd.Series) -> pd.Series:
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:
     """Write figures as JSON; what is not finite becomes null, as JSON has no word for it."""
-    text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
-    Path(path).write_text(text + "\n", encoding="utf-8")
+    Path(path).write_text(json_text(content), encoding="utf-8")
+
+
+def json_text(content: dict[str, Any]) -> str:
+    """Return figures as one JSON object; what is not finite is null."""
+    return json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:

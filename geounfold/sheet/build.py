@@ -34,6 +34,7 @@ class ControlOptions:
     ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
     where they vary; ``focal``: largest share of the focal distance, ``focal_refined``: the same
     with cells of half the side; ``slopes``: of the caps along the sheet, tried in order;
+    ``slope``: the offset surfaces that are flattened lie within this share of the caps;
     ``reach``: radius, in cells, of the filter on varying offsets;
     ``shrinks``: most steps of the repair; ``shell``: how far the shell reaches past the mesh.
     """

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from geounfold.control import ControlMesh
     from geounfold.drillholes import DrillHoles, read_drillholes
     from geounfold.errors import GeounfoldError, InputError
+    from geounfold.estimator import Unfolder
     from geounfold.flattening import FLATTENERS, Flattening, flatten
     from geounfold.mapping import UnfoldingMap, load
     from geounfold.mesh import TetMesh, TriMesh
@@ -42,6 +43,7 @@ _HOMES = {
     "TetMesh": "mesh",
     "TriMesh": "mesh",
     "UnfoldOptions": "options",
+    "Unfolder": "estimator",
     "Unfolding": "pipeline",
     "unfold": "pipeline",
     "aligned_rms": "quality",
@@ -61,6 +63,7 @@ __all__ = [
     "TetMesh",
     "TriMesh",
     "UnfoldOptions",
+    "Unfolder",
     "Unfolding",
     "UnfoldingMap",
     "__version__",

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from geounfold.errors import OptionError
 from geounfold.geometry import tet_volumes
-from geounfold.mesh import Floats, Ints, TetMesh
+from geounfold.mesh import Floats, Ints, Space, TetMesh, in_space
+
+if TYPE_CHECKING:
+    import pyvista
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +32,17 @@ class ControlMesh:
     folded: TetMesh
     unfolded: TetMesh
     stratigraphic: Floats
+
+    def to_pyvista(self, space: Space = "folded") -> pyvista.UnstructuredGrid:
+        """Return the tetrahedra in one space for pyvista.
+
+        Point data: ``stratigraphic``, and by the other space's name where each vertex lies there.
+        """
+        here, there, other = in_space(space, self.folded, self.unfolded)
+        grid = here.to_pyvista()
+        grid.point_data[other] = there.V
+        grid.point_data["stratigraphic"] = self.stratigraphic
+        return grid
 
     @property
     def inverted_folded(self) -> int:

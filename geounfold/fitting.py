@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,15 @@ from geounfold.flattening import Flattening, flatten
 from geounfold.frame import Frame
 from geounfold.geometry import face_normals, triangle_areas
 from geounfold.hull import Hull, extract_hull
-from geounfold.mesh import Floats, TriMesh
+from geounfold.mesh import Floats, Space, TriMesh, in_space
 from geounfold.options import UnfoldOptions
 from geounfold.reference import split_reference
 from geounfold.sheet import SheetResult, fit_body
 from geounfold.split import SurfaceSplit, split
 from geounfold.thesis import thesis_control
+
+if TYPE_CHECKING:
+    import pyvista
 
 Stage = Callable[[str], AbstractContextManager[None]]
 """``with stage("hull"):`` times a stage and shows its name."""
@@ -35,6 +39,16 @@ class SurfacePair:
     folded: TriMesh
     unfolded: TriMesh
     flattening: Flattening
+
+    def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
+        """Return the surface in one space for pyvista.
+
+        The point data of the other space's name, (n, 3), holds where each vertex lies there.
+        """
+        here, there, other = in_space(space, self.folded, self.unfolded)
+        surface = here.to_pyvista()
+        surface.point_data[other] = there.to_pyvista().points
+        return surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geounfold.errors import MeshError
+from geounfold.errors import MeshError, OptionError
+
+if TYPE_CHECKING:
+    import pyvista
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+Space = Literal["folded", "unfolded"]
+"""Which side of the map."""
+
+_T = TypeVar("_T")
+
+
+def in_space(space: Space, folded: _T, unfolded: _T) -> tuple[_T, _T, Space]:
+    """Return what lies in a space, its twin in the other, and the other's name.
+
+    Raises
+    ------
+    OptionError
+        Neither folded nor unfolded.
+    """
+    if space == "folded":
+        return folded, unfolded, "unfolded"
+    if space == "unfolded":
+        return unfolded, folded, "folded"
+    raise OptionError(f"space must be folded or unfolded, but is {space!r}")
 
 
 def _checked(
@@ -70,6 +94,14 @@ class TriMesh:
         """Return the same faces over other vertices, (n, 3) or (n, 2)."""
         return TriMesh(vertices, self.F)
 
+    def to_pyvista(self) -> pyvista.PolyData:
+        """Return the surface for pyvista; flat vertices (n, 2) at height 0."""
+        import pyvista
+
+        V = np.zeros((len(self.V), 3))
+        V[:, : self.V.shape[1]] = self.V
+        return pyvista.PolyData.from_regular_faces(V, self.F.copy())
+
     def submesh(self, faces: Bools | Ints) -> tuple[TriMesh, Ints]:
         """Return the mesh of some faces without unused vertices, and its vertices' old indices."""
         old, F = np.unique(self.F[faces], return_inverse=True)
@@ -104,6 +136,14 @@ class TetMesh:
     def with_vertices(self, vertices: Floats) -> TetMesh:
         """Return the same tetrahedra over other vertices, (n, 3)."""
         return TetMesh(vertices, self.T)
+
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
+        """Return the tetrahedra for pyvista."""
+        import pyvista
+
+        cells = np.column_stack([np.full(len(self.T), 4), self.T]).ravel()
+        kinds = np.full(len(self.T), pyvista.CellType.TETRA)
+        return pyvista.UnstructuredGrid(cells, kinds, self.V.copy())
 
 
 def as_trimesh(mesh: TriMesh | tuple[Floats, Ints]) -> TriMesh:

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, overload
 
 import numpy as np
 import pandas as pd
@@ -23,19 +23,23 @@ from geounfold.cloud import QUIET, unevenness
 from geounfold.config import to_toml
 from geounfold.control import ControlMesh, scaled, side_by_side
 from geounfold.disturbed import disturbed_lattice
+from geounfold.display import Facts
 from geounfold.errors import ControlMeshError, InputError
 from geounfold.fitting import BodyFit, SurfacePair, fit
 from geounfold.flattening import Flattening
 from geounfold.frame import Frame, working_frame
 from geounfold.geometry import enclosed_volume, triangle_areas
 from geounfold.hull import Hull
-from geounfold.io.coordinates import coordinate_columns, numbers
+from geounfold.io.results import FOLDED, UNFOLDED, frame_points, result_columns, with_carried
 from geounfold.lattice import Lattice, measure_lattice
 from geounfold.mapping import Carried, UnfoldingMap, checked_points
-from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.mesh import Floats, Ints, Space, TriMesh, as_trimesh, in_space
 from geounfold.options import UnfoldOptions
 from geounfold.quality import SUSPECT, Quality, assess, torn_blocks
 from geounfold.solid import solid_cells
+
+if TYPE_CHECKING:
+    import pyvista
 
 Progress = Callable[[str], None]
 
@@ -155,6 +159,7 @@ def unfold(
         clock.seconds,
         fitted,
         len(torn),
+        points if isinstance(points, pd.DataFrame) else None,
     )
 
 
@@ -220,9 +225,7 @@ def _check_placed(
 def _points(points: Floats | pd.DataFrame) -> Floats:
     """Return finite (n, 3) coordinates, of a DataFrame those of its coordinate columns."""
     if isinstance(points, pd.DataFrame):
-        names = [str(name) for name in points.columns]
-        columns = [points.iloc[:, k] for k in coordinate_columns(names)]
-        points = np.column_stack([numbers(column) for column in columns])
+        points = frame_points(points)
     return checked_points(points)
 
 
@@ -312,6 +315,7 @@ class Unfolding:
         seconds: dict[str, float],
         fitted_points: int,
         torn: int,
+        given: pd.DataFrame | None = None,
     ) -> None:
         self.folded = folded
         self.options = options
@@ -326,6 +330,7 @@ class Unfolding:
         self._returned = back.points
         self._fitted_points = fitted_points
         self._torn = torn
+        self._given = None if given is None else given.copy()
 
     @property
     def points(self) -> Floats:
@@ -347,6 +352,19 @@ class Unfolding:
         """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear."""
         return self.quality.blocks.columns()
 
+    @property
+    def table(self) -> pd.DataFrame:
+        """The DataFrame given, or x, y and z of an array, with all results as further columns.
+
+        Index, columns, their order and types are as given; a column called as a result is
+        replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
+        stratigraphic, location, mesh_distance and those of ``columns``.
+        """
+        given = self._given
+        if given is None:
+            given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
+        return given.assign(**result_columns(UNFOLDED, self.carried), **self.columns)
+
     def to_flat(self, points: Floats) -> Floats:
         """Return other folded points (m, 3) in the flat space."""
         return self.map.to_flat(points)
@@ -354,6 +372,66 @@ class Unfolding:
     def to_folded(self, points: Floats) -> Floats:
         """Return points of the flat space (m, 3) in the folded one."""
         return self.map.to_folded(points)
+
+    @overload
+    def transform(self, points: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, points: Floats) -> Floats: ...
+    def transform(self, points: Floats | pd.DataFrame) -> Floats | pd.DataFrame:
+        """Return other folded points in the flat space.
+
+        Parameters
+        ----------
+        points : (m, 3) array or DataFrame
+            Of a DataFrame the coordinate columns are found by name.
+
+        Returns
+        -------
+        (m, 3) array or DataFrame
+            As given; a DataFrame with its index and columns, and unfolded_x, unfolded_y,
+            unfolded_z, stratigraphic, location and mesh_distance.  Points beyond the map's reach
+            are NaN.
+
+        Raises
+        ------
+        InputError
+            Coordinates that are missing, infinite or no numbers.
+        """
+        if isinstance(points, pd.DataFrame):
+            return with_carried(points, self.map.carry, UNFOLDED)
+        return self.to_flat(points)
+
+    @overload
+    def inverse_transform(self, points: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, points: Floats) -> Floats: ...
+    def inverse_transform(self, points: Floats | pd.DataFrame) -> Floats | pd.DataFrame:
+        """Return points of the flat space in the folded one.
+
+        As ``transform``; a DataFrame's columns unfolded_x, unfolded_y, unfolded_z are taken
+        before others, and it gets folded_x, folded_y, folded_z, location and mesh_distance.
+        """
+        if isinstance(points, pd.DataFrame):
+            return with_carried(points, partial(self.map.carry, inverse=True), FOLDED)
+        return self.to_folded(points)
+
+    def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
+        """Return the points in one space with all columns, the other space as an array.
+
+        Parameters
+        ----------
+        space : {"folded", "unfolded"}
+            Where the points lie; the point data of the other's name, (n, 3), holds where they
+            lie there.  Unfolded, points without an image (location outside) are left out.
+        """
+        from geounfold.io.formats.vtk import cloud
+
+        here, there, other = in_space(space, self.folded, self.points)
+        keep = np.isfinite(here).all(axis=1)
+        columns = {str(name): _plain_column(c)[keep] for name, c in self.table.items()}
+        made = cloud(here[keep], columns)
+        made.point_data[other] = there[keep]
+        return made
 
     @property
     def hull(self) -> Hull | None:
@@ -513,12 +591,39 @@ class Unfolding:
             out.append(f"the map is not proved one-to-one: {', '.join(self.certificate.faults)}")
         return out
 
-    def __repr__(self) -> str:
-        """Return one line: points, method, error and outside share."""
-        return (
-            f"<Unfolding of {len(self.folded)} points by {self.options.method}: epsilon "
-            f"{self.quality.nmd.mean:.4f}, {self.outside_share:.2%} outside>"
+    def _facts(self) -> Facts:
+        return Facts(
+            points=len(self.folded),
+            bodies=len(self.fits),
+            outside=int((~self.carried.inside).sum()),
+            method=self.options.method,
+            faults=() if self.certificate.injective else self.certificate.faults,
+            checked=self.certificate.tetrahedra,
+            epsilon=self.quality.nmd.mean,
+            epsilon_p95=self.quality.nmd.p95,
+            volume=self.quality.volume_unfolded / self.quality.volume_folded,
+            round_trip=self.round_trip_max,
+            seconds=sum(self.seconds.values()),
+            warnings=self._warnings(),
         )
+
+    def __repr__(self) -> str:
+        """Return one line: points, method, verdict, error and points outside."""
+        return self._facts().line()
+
+    def _repr_html_(self) -> str:
+        """Return verdict, certificate and figures as a small table, for notebooks."""
+        return self._facts().html()
+
+
+def _plain_column(column: pd.Series) -> np.ndarray:
+    """Return a column as VTK can hold it: numbers, truth values as 0 and 1, else texts."""
+    if pd.api.types.is_bool_dtype(column.dtype) and not column.hasnans:
+        return column.to_numpy(dtype=np.uint8)
+    if pd.api.types.is_numeric_dtype(column.dtype):
+        exact = isinstance(column.dtype, np.dtype)
+        return column.to_numpy() if exact else column.to_numpy(np.float64, na_value=np.nan)
+    return column.astype(object).where(column.notna(), "").astype(str).to_numpy(dtype=object)
 
 
 def _flattening_summary(flattening: Flattening) -> dict[str, Any]:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from geounfold.io.coordinates import Triple
+import numpy as np
+import pandas as pd
+
+from geounfold.io.coordinates import Triple, coordinate_columns, numbers
+from geounfold.mesh import Floats
 
 if TYPE_CHECKING:
     from geounfold.mapping import Carried
@@ -26,3 +31,29 @@ def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
         "location": carried.location,
         "mesh_distance": carried.distance,
     }
+
+
+def frame_points(frame: pd.DataFrame, prefer: Triple | None = None) -> Floats:
+    """Return the coordinates in a DataFrame, (n, 3); those called as `prefer` where they exist.
+
+    Raises
+    ------
+    InputError
+        No coordinate columns, several sets of them, or values that are no numbers.
+    """
+    names = [str(name) for name in frame.columns]
+    there = prefer if prefer is not None and set(prefer) <= set(names) else None
+    columns = [frame.iloc[:, k] for k in coordinate_columns(names, there)]
+    return np.column_stack([numbers(column) for column in columns])
+
+
+def with_carried(
+    frame: pd.DataFrame, carry: Callable[[Floats], Carried], names: Triple
+) -> pd.DataFrame:
+    """Return a DataFrame with where its points came to lie: index, columns and types are kept.
+
+    The way back looks for the unfolded coordinates first.  A column called as a result is replaced
+    in its place.
+    """
+    points = frame_points(frame, UNFOLDED if names == FOLDED else None)
+    return frame.assign(**result_columns(names, carry(points)))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geounfold.control import scaled
+
 if TYPE_CHECKING:
     from geounfold.certificate import Certificate
     from geounfold.mapping import UnfoldingMap
@@ -29,15 +31,9 @@ def write_control(path: str | Path, mapping: UnfoldingMap, certificate: Certific
     certificate : Certificate
         Of this map.
     """
-    import pyvista
-
     whole, frame = mapping.whole, mapping.frame
     T = whole.folded.T
-    cells = np.column_stack([np.full(len(T), 4), T]).ravel()
-    kinds = np.full(len(T), pyvista.CellType.TETRA)
-    grid = pyvista.UnstructuredGrid(cells, kinds, frame.to_world(whole.folded.V))
-    grid.point_data["unfolded"] = whole.unfolded.V * frame.scale
-    grid.point_data["stratigraphic"] = whole.stratigraphic
+    grid = scaled(whole, frame.to_world(whole.folded.V), frame.scale).to_pyvista()
     fault, blocks = np.zeros(len(T), np.uint8), np.zeros(len(T), np.int64)
     fault[certificate.elements] = 1
     blocks[certificate.elements] = certificate.blocks

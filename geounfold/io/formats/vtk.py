@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 from geounfold.errors import InputError
 from geounfold.io.formats.frames import flattened
 from geounfold.io.formats.registry import Meta, Points, Surface
+from geounfold.mesh import Floats
 
 _META = ("unit", "crs")
 
@@ -47,17 +48,23 @@ def read_points(path: Path) -> Points:
 
 def write_points(path: Path, points: Points) -> None:
     """Write points as vertices with point data (.vtp poly data, .vtu unstructured grid)."""
+    mesh = cloud(points.xyz, points.data)
+    if path.suffix.lower() == ".vtu":
+        mesh = mesh.cast_to_unstructured_grid()
+    _save(mesh, path, points.meta)
+
+
+def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
+    """Return points (n, 3) as pyvista poly data with their values (texts as object arrays)."""
     import pyvista
 
-    cloud: Any = pyvista.PolyData(np.ascontiguousarray(points.xyz))
-    for name, values in points.data.items():
+    mesh: Any = pyvista.PolyData(np.array(xyz, dtype=np.float64, order="C"))
+    for name, values in data.items():
         if values.dtype == object:
-            add_text(cloud.GetPointData(), name, values)
+            add_text(mesh.GetPointData(), name, values)
         else:
-            cloud.point_data[name] = values
-    if path.suffix.lower() == ".vtu":
-        cloud = cloud.cast_to_unstructured_grid()
-    _save(cloud, path, points.meta)
+            mesh.point_data[name] = values
+    return mesh
 
 
 def read_surface(path: Path) -> Surface:

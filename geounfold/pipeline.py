@@ -22,8 +22,8 @@ from geounfold.certificate import Certificate, certify
 from geounfold.cloud import QUIET, unevenness
 from geounfold.config import to_toml
 from geounfold.control import ControlMesh, scaled, side_by_side
-from geounfold.disturbed import disturbed_lattice
 from geounfold.display import Facts
+from geounfold.disturbed import disturbed_lattice
 from geounfold.errors import ControlMeshError, InputError
 from geounfold.fitting import BodyFit, SurfacePair, fit
 from geounfold.flattening import Flattening

@@ -5,6 +5,8 @@ import pytest
 
 import geounfold as gu
 from geounfold.hull import HullOptions, extract_hull
+from geounfold.lattice import measure_lattice
+from geounfold.solid import solid_cells
 from geounfold.synthetic import simulate
 
 # A body, its thickness in metres (blocks of 10), and what else is changed.  In the comments the
@@ -72,3 +74,12 @@ def test_blocks_that_touch_along_edges_only_make_one_hull_with_its_hole():
     edges = 3 * len(hull.mesh.F) // 2
     assert len(hull.mesh.V) - edges + len(hull.mesh.F) == 0  # genus 1: Euler characteristic 0
     assert hull.dropped == 0
+
+
+@pytest.mark.parametrize("thickness", [10.0, 12.0, 15.0, 20.0])
+@pytest.mark.parametrize("dip", [0, 35])
+def test_steps_of_a_thin_sheet_are_no_missing_blocks(thickness, dip):
+    # Terraces that touch along edges only, and the corners between them; up to the whole sheet
+    # again was filled where fewer neighbours than 16 could make a missing block.
+    body = simulate("thin", blocks=5000, thickness=thickness, lattice_dip=dip)
+    assert solid_cells(body.folded, measure_lattice(body.folded)) is None

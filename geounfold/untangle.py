@@ -20,8 +20,8 @@ from scipy.optimize import minimize
 from geounfold.geometry import tet_volumes
 from geounfold.mesh import Floats, Ints
 
-_ROUNDS = 20  # values of eps
-_STEPS = 60  # L-BFGS steps for each
+_ROUNDS = 10  # values of eps
+_STEPS = 50  # L-BFGS steps for each
 _RINGS = (1, 2, 4)  # neighbourhoods of the bad elements that are freed, one after the other
 _SOUND = 1e-3  # determinant from which an element counts as upright
 _LEAST = 1e-6  # eps where nothing is inverted

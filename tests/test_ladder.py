@@ -131,6 +131,26 @@ def test_tents_hold_blocks_just_outside_and_stay_proved(plunging):
     assert np.array_equal(more.folded[: laid.inner], laid.folded)
 
 
+def test_a_few_blocks_in_the_shell_are_taken_into_the_body(plunging):
+    columns, _ = columns_of(plunging)
+    columns = replace(columns, reach=3.0)
+    offsets = np.full((2, columns.count), np.abs(columns.high).max() + 0.6)
+    laid = columns.lay_out(columns.surround(columns.layers(offsets, FRACTIONS)))
+    rows = np.array([5, 700])
+    places = laid.folded[laid.shell[rows]].mean(axis=1)
+    more = laid.taking_in(rows)
+    assert len(more.T) == len(laid.T) + 2
+    assert len(more.shell) == len(laid.shell) - 2
+    assert more.inner > laid.inner
+    assert more.T.max() < more.inner
+    # The same tetrahedra in the same places, in both spaces.
+    assert np.allclose(more.folded[more.T[-2:]].mean(axis=1), places)
+    assert tet_volumes(more.folded, more.all_tets).sum() == pytest.approx(
+        tet_volumes(laid.folded, laid.all_tets).sum()
+    )
+    assert examine(more.unfolded, Gluing.of(more.all_tets)).none
+
+
 def test_the_ladder_records_what_every_rung_gave(plunging):
     columns, points = columns_of(plunging)
 

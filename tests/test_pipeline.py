@@ -9,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import geounfold as gu
-from geounfold import fitting
+from geounfold import fitting, pipeline
 from geounfold.errors import ControlMeshError, InputError, OptionError
 from geounfold.geometry import tet_volumes
+from geounfold.sheet import ControlOptions, SheetOptions
 from geounfold.synthetic import simulate
 
 # A lattice that cuts a plunging fold, a grid folded whole, a lattice turned in all three axes.
@@ -229,16 +230,31 @@ def test_option_values_are_checked(option, value):
         gu.UnfoldOptions(**{option: value})
 
 
-def test_torn_blocks_are_an_error_unless_allowed():
-    # Limbs that all but touch on a strip hardly wider than its thickness: the mid surface
-    # runs into the other limb, and no tetrahedron is inverted.
-    body = simulate("recumbent", blocks=12000).folded
-    # Since boundaries are examined, the map is refused before its blocks are.
-    with pytest.raises(ControlMeshError, match=r"torn from their neighbours|not one-to-one"):
-        gu.unfold(body)
-    u = gu.unfold(body, allow_uncertified=True)
-    assert u.summary()["torn"] > 0
+def test_torn_blocks_are_an_error_unless_allowed(swelling, monkeypatch):
+    # The bodies that were torn once unfold now; what is torn, test_quality.py tests.
+    monkeypatch.setattr(pipeline, "torn_blocks", lambda *_: np.array([3, 8]))
+    with pytest.raises(ControlMeshError, match=r"2 of .* torn from their neighbours, around"):
+        gu.unfold(swelling)
+    u = gu.unfold(swelling, allow_uncertified=True)
+    assert u.summary()["torn"] == 2
     assert any("torn" in w for w in u.summary()["warnings"])
+
+
+def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling):
+    # A control mesh a block short of the body's top and bottom, and nothing around it.
+    short = SheetOptions(control=ControlOptions(pad=-1.0, pad_capped=-1.0))
+    with pytest.raises(ControlMeshError, match=r"lie outside the control mesh.*around"):
+        gu.unfold(swelling, reach=0.0, sheet_options=short)
+    u = gu.unfold(swelling, reach=0.0, sheet_options=short, allow_uncertified=True)
+    empty = u.location == "outside"
+    assert 0 < empty.mean() < 0.1  # the outermost layers where the sheet swells; measured 0.02
+    assert np.isnan(u.points[empty]).all()
+    assert np.isnan(u.columns["nmd_error"][empty]).all()
+    assert np.isfinite(u.points[~empty]).all()
+    assert u.summary()["outside"]["empty"] == empty.sum()
+    assert any("left empty" in w for w in u.summary()["warnings"])
+    # The same with a shell: every block has a place.
+    assert (gu.unfold(swelling, sheet_options=short).location != "outside").all()
 
 
 def test_the_thesis_method_reaches_its_figures():

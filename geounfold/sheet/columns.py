@@ -33,6 +33,8 @@ class Laid:
         Node of each.
     T, shell : (m, 4), (s, 4) int
         Tetrahedra of the body and of the shell.
+    inner : int
+        Number of the body's vertices.
     """
 
     layers: Layers
@@ -42,11 +44,7 @@ class Laid:
     node: Ints
     T: Ints
     shell: Ints
-
-    @property
-    def inner(self) -> int:
-        """Number of the body's vertices."""
-        return len(self.layers.P) * len(self.layers.fractions)
+    inner: int
 
     @property
     def all_tets(self) -> Ints:
@@ -63,6 +61,27 @@ class Laid:
             stratigraphic=self.stratigraphic[:n],
             node=self.node[:n],
             shell=np.empty((0, 4), np.int64),
+        )
+
+    def taking_in(self, rows: Ints) -> Laid:
+        """Return the prisms with some of the shell's tetrahedra as the body's."""
+        moved = np.zeros(len(self.shell), dtype=bool)
+        moved[rows] = True
+        used = np.unique(self.shell[moved])
+        first = np.zeros(len(self.folded), dtype=bool)
+        first[: self.inner], first[used] = True, True
+        order = np.argsort(~first, kind="stable")
+        number = np.empty_like(order)
+        number[order] = np.arange(len(order))
+        return replace(
+            self,
+            folded=self.folded[order],
+            unfolded=self.unfolded[order],
+            stratigraphic=self.stratigraphic[order],
+            node=self.node[order],
+            T=np.concatenate([self.T, number[self.shell[moved]]]),
+            shell=number[self.shell[~moved]],
+            inner=int(first.sum()),
         )
 
     def control(self) -> ControlMesh:
@@ -202,6 +221,7 @@ class Columns:
             node,
             around.layers.tets(),
             around.tets(),
+            n * count,
         )
 
     def _unfolded(self, whole: Layers, height: Floats, node: Ints) -> tuple[Floats, Floats]:

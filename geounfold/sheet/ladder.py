@@ -22,8 +22,8 @@ from geounfold.untangle import untangle
 
 _BLENDS = 8  # rounds of falling back to nearer offsets
 _BLEND = 0.6  # largest slope of the offsets between the two
-_MOVABLE = 0.1  # share of the vertices beyond which nothing is untangled
-_TENTS = 0.002  # share of the blocks beyond which the next rung is tried first
+_MOVABLE = 0.03  # share of the vertices beyond which nothing is untangled
+_FEW = 0.002  # share of the blocks that may be taken in one by one
 _TRIMS = 8  # rounds of trimming before the shell is given up
 
 
@@ -148,7 +148,7 @@ def climb(
             sound = [mesh.layers for _, _, _, other, mesh in held if other is columns]
             near = sound[-1] if sound else columns.bare(layers)
             columns, laid, rung = _blended(columns, layers, near, exam)
-            if laid is None and not sound:
+            if laid is None and not held:
                 records.append(rung)
                 _, _, columns, layers, exam = flawed[-1]
                 laid, rung = _untangled(columns, layers, exam)
@@ -193,20 +193,32 @@ def _blended(
 
 
 def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:
-    """Return the prisms with tents over points that neither they nor their shell hold.
+    """Return the prisms with what else it takes to hold a few points that they do not.
 
-    With them the number of points outside the prisms, and of those that nothing holds.
+    Tents are raised over points that the shell does not hold either, and tetrahedra of the shell
+    that hold points become the body's.  Where many points are outside, those in the shell are
+    left there.  With the prisms the number of points outside the body's tetrahedra, and of those
+    that nothing holds.
     """
     missed = points[TetIndex(laid.folded, laid.T).locate(points) < 0]
     if not len(missed):
         return laid, 0, 0
-    lost = missed
-    if len(laid.shell):
-        lost = missed[TetIndex(laid.folded, laid.shell).locate(missed) < 0]
-    if len(lost) > _TENTS * len(points):
+    lost = missed[_in_shell(laid, missed) < 0]
+    few = _FEW * len(points)
+    if len(lost) <= few:
+        laid, left = with_tents(laid, lost)
+        lost = lost[left]
+    if len(missed) > few:
         return laid, len(missed), len(lost)
-    laid, left = with_tents(laid, lost)
-    return laid, len(missed), len(left)
+    held = _in_shell(laid, missed)
+    return laid.taking_in(np.unique(held[held >= 0])), len(lost), len(lost)
+
+
+def _in_shell(laid: Laid, points: Floats) -> Ints:
+    """Return the shell's tetrahedron that holds each point (k, 3), -1 for none."""
+    if not len(laid.shell):
+        return np.full(len(points), -1)
+    return TetIndex(laid.folded, laid.shell).locate(points)
 
 
 def _untangled(columns: Columns, layers: Layers, exam: _Exam) -> tuple[Laid | None, Rung]:

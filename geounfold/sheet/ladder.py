@@ -23,7 +23,8 @@ from geounfold.untangle import untangle
 _BLENDS = 8  # rounds of falling back to nearer offsets
 _BLEND = 0.6  # largest slope of the offsets between the two
 _MOVABLE = 0.03  # share of the vertices beyond which nothing is untangled
-_FEW = 0.002  # share of the blocks that may be taken in one by one
+_FEW = 0.002  # share of the blocks in the shell up to which they are taken into the body
+_TENTS = 0.02  # share of the blocks up to which tents are raised over them
 _TRIMS = 8  # rounds of trimming before the shell is given up
 
 
@@ -204,11 +205,10 @@ def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:
     if not len(missed):
         return laid, 0, 0
     lost = missed[_in_shell(laid, missed) < 0]
-    few = _FEW * len(points)
-    if len(lost) <= few:
+    if len(lost) <= _TENTS * len(points):
         laid, left = with_tents(laid, lost)
         lost = lost[left]
-    if len(missed) > few:
+    if len(missed) > _FEW * len(points):
         return laid, len(missed), len(lost)
     held = _in_shell(laid, missed)
     return laid.taking_in(np.unique(held[held >= 0])), len(lost), len(lost)

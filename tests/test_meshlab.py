@@ -67,3 +67,8 @@ def test_an_absent_pymeshlab_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     with pytest.raises(MissingDependencyError, match="pip install pymeshlab"):
         meshlab.taubin(V, F, 2)
+
+
+def test_a_surface_without_vertices_is_refused():
+    with pytest.raises(BackendError, match="takes no such surface"):
+        meshlab.taubin(np.empty((0, 3)), np.empty((0, 3), np.int64), 1)

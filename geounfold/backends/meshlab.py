@@ -39,7 +39,10 @@ def _mesh_set(V: Floats, F: Ints | None = None, normals: Floats | None = None) -
     if normals is not None:
         parts["v_normals_matrix"] = np.ascontiguousarray(normals, dtype=np.float64)
     meshes = ml.MeshSet(verbose=False)
-    meshes.add_mesh(ml.Mesh(**parts))
+    try:
+        meshes.add_mesh(ml.Mesh(**parts))
+    except ml.PyMeshLabException as error:
+        raise BackendError(f"MeshLab takes no such surface: {_one_line(error)}") from error
     return meshes
 
 

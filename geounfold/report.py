@@ -147,6 +147,7 @@ def report_html(
         _tiles(summary),
         "<h2>Warnings</h2>",
         _list(summary.get("warnings", [])) or "<p>None.</p>",
+        _section("Elements at fault", _flaws(summary)),
         "<h2>Before and after</h2>",
         *_pictures(X, Y, drawn, view),
         "<h2>Distributions over the blocks</h2>",
@@ -454,6 +455,21 @@ def _making(summary: Mapping[str, Any]) -> dict[str, Any]:
     out = {label: known[key] for key, label in _MADE.items() if known.get(key) is not None}
     out.update({k.replace("_", " "): v for k, v in _mapping(summary.get("method")).items()})
     return out
+
+
+def _flaws(summary: Mapping[str, Any]) -> str:
+    """Return one row per element that keeps the map from being proved, those with blocks first."""
+    flaws = _mapping(summary.get("certificate")).get("flaws") or []
+    rows = [
+        {
+            "element": flaw["element"],
+            "blocks": flaw["blocks"],
+            "folded": ", ".join(_number(x) for x in flaw["folded"]),
+            "unfolded": ", ".join(_number(x) for x in flaw["unfolded"]),
+        }
+        for flaw in flaws
+    ]
+    return _table(rows) if rows else ""
 
 
 def _surfaces(summary: Mapping[str, Any]) -> str:

@@ -114,6 +114,22 @@ def test_the_verdict_follows_the_worst_thing_known(change, level, said):
     assert said in given.headline
 
 
+@needs_rendering
+def test_elements_at_fault_are_listed_with_their_places():
+    flaw = {"element": 4711, "blocks": 8, "folded": [1.5, 2.5, -3.5], "unfolded": [9.25, 8.0, 7.0]}
+    certificate = {
+        "injective": False,
+        "crossing_folded": 2,
+        "crossing_unfolded": 0,
+        "blocks_in_faulty_elements": 8,
+        "flaws": [flaw],
+    }
+    summary = SOUND | {"injective": False, "certificate": certificate}
+    words = " ".join(Page(report_html(summary, SLAB[:8], SLAB[:8], {}, view=SMALL)).words)
+    for expected in ("Elements at fault", "4711", "1.5, 2.5, -3.5", "9.25", "8 blocks lie in"):
+        assert expected in words
+
+
 def test_the_verdict_says_what_the_measure_hides():
     assert any("would score 0" in reason for reason in verdict(SUMMARY).reasons)
 

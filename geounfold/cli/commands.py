@@ -31,7 +31,7 @@ from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_tabl
 
 if TYPE_CHECKING:
     from geounfold.mapping import UnfoldingMap
-    from geounfold.mesh import Floats, TriMesh
+    from geounfold.mesh import Bools, Floats, TriMesh
     from geounfold.options import UnfoldOptions
 
 _POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
@@ -110,7 +110,10 @@ def unfold(args: Namespace, console: Console) -> None:
         if "--report" in parts:
             from geounfold.report import write_report
 
-            write_report(parts["--report"], summary, table.points, result.points, columns)
+            there = np.isfinite(result.points).all(axis=1)  # blocks without an image: no picture
+            drawn = {name: np.asarray(values)[there] for name, values in columns.items()}
+            blocks = table.points[there], result.points[there]
+            write_report(parts["--report"], summary, *blocks, drawn)
     for warning in warnings:
         console.warn(str(warning))
     if carried is not None:
@@ -397,9 +400,12 @@ def _draw_map(path: str, console: Console) -> bytes:
 def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
     """Return a picture of points, coloured by a column, by layer or by height."""
     label = colour or _default_colour(table)
+    there = _with_image(table)
+    if not there.all():
+        console.warn(f"{table.source}: {np.count_nonzero(~there)} points without an image left out")
     values = table.numbers(label)
-    if not np.isfinite(values).all():
-        missing = np.flatnonzero(~np.isfinite(values))
+    if not np.isfinite(values[there]).all():
+        missing = np.flatnonzero(there & ~np.isfinite(values))
         raise InputError(
             f"{table.source}: column '{label}' has {len(missing)} missing or infinite values, "
             f"the first in data row {missing[0] + 1}; choose a column that every row has"
@@ -409,12 +415,19 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
     console.stage("drawing")
     for names, title in ((UNFOLDED, "unfolded"), (_TRUE, "truth")):
         if set(names) <= set(table.frame.columns) and names != table.columns:
-            twin = np.column_stack([table.numbers(name) for name in names])
+            twin = np.column_stack([table.numbers(name) for name in names])[there]
             titles = ("unfolded" if table.columns == UNFOLDED else "folded", title)
             return plotting.png(
-                plotting.draw_bodies(table.points, twin, values, label, titles=titles)
+                plotting.draw_bodies(table.points[there], twin, values[there], label, titles=titles)
             )
-    return plotting.png(plotting.draw_body(table.points, values, label))
+    return plotting.png(plotting.draw_body(table.points[there], values[there], label))
+
+
+def _with_image(table: PointTable) -> Bools:
+    """Return which rows of a table do not lie outside the reach of the map that carried them."""
+    if "location" not in table.frame.columns:
+        return np.ones(len(table), dtype=bool)
+    return np.asarray(table.frame["location"].astype(str) != "outside", dtype=bool)
 
 
 def _default_colour(table: PointTable) -> str:

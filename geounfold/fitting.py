@@ -87,6 +87,7 @@ class BodyFit:
 
 def fit(
     points: Floats,
+    blocks: Floats,
     frame: Frame,
     options: UnfoldOptions,
     reference: tuple[TriMesh, TriMesh] | None,
@@ -97,7 +98,10 @@ def fit(
     Parameters
     ----------
     points : (n, 3) float
-        The body's blocks, working units.
+        What the body is fitted to, working units: its blocks moved onto their lattice, sub-blocks
+        and gaps filled.
+    blocks : (b, 3) float
+        Its blocks as they were given, which the control mesh has to hold.
     frame : Frame
         Working frame.
     options : UnfoldOptions
@@ -129,7 +133,7 @@ def fit(
         result = _fit_thesis(points, hull, parts, options, stage)
     else:
         datum = _OTHER_SIDE.get(options.datum, options.datum) if over else options.datum
-        result = _fit_sheet(points, frame, hull, parts, options, datum, stage)
+        result = _fit_sheet(points, blocks, frame, hull, parts, options, datum, stage)
     if over:
         result = _turned_over(result)
     return result
@@ -147,6 +151,7 @@ def _flattener(options: UnfoldOptions) -> Callable[[TriMesh, Floats | None], Fla
 
 def _fit_sheet(
     points: Floats,
+    blocks: Floats,
     frame: Frame,
     hull: Hull | None,
     parts: SurfaceSplit,
@@ -160,6 +165,7 @@ def _fit_sheet(
         result = fit_body(
             parts,
             points,
+            blocks,
             frame.steps,
             variance,
             inset,

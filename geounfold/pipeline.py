@@ -129,8 +129,12 @@ def unfold(
         own = labels if solid is None else labels[solid.home]
         groups = select_body(P, own, chosen.body)
         parts = [_sorted(work[labels == own[group[0]]]) for group in groups]
+        given = frame.to_work(P)
     reference = _reference(top, bottom, frame)
-    fits = [fit(part, frame, chosen, reference, clock.stage) for part in parts]
+    fits = [
+        fit(part, _sorted(given[group]), frame, chosen, reference, clock.stage)
+        for part, group in zip(parts, groups, strict=True)
+    ]
     with clock.stage("map"):
         mapping = _mapping(fits, frame, chosen)
         carried = mapping.carry(P)
@@ -142,7 +146,7 @@ def unfold(
     with clock.stage("quality"):
         world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
         quality = assess(world, whole, carried.element, P, carried.points, chosen.neighbours)
-        torn = _torn(groups, work, carried, quality, frame)
+        torn = _torn(groups, given, carried, quality, frame)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
     return Unfolding(

@@ -82,6 +82,7 @@ class SheetResult:
 def fit_body(
     split: SurfaceSplit,
     points: Floats,
+    blocks: Floats,
     steps: Floats | None,
     variance: Floats,
     inset: float,
@@ -97,7 +98,9 @@ def fit_body(
     split : SurfaceSplit
         The hull's (or the reference surfaces') faces as top, bottom, rim; working units.
     points : (n, 3) float
-        Blocks, working units.
+        What the sheet is fitted to, working units: blocks on their lattice, gaps filled.
+    blocks : (b, 3) float
+        Blocks as they were given, which the control mesh has to hold.
     steps : (3,) float or None
         Block sides, where the blocks lie on a lattice at whole multiples of them.
     variance : (3,) float
@@ -132,7 +135,7 @@ def fit_body(
     horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
     if sites is not None and sharpened:
         horizons = separate_horizons(fitted, horizons, sites, options.horizons, options.occupancy)
-    mesh = build_control(fitted, horizons, points, flatten, options.control, datum)
+    mesh = build_control(fitted, horizons, points, blocks, flatten, options.control, datum)
     return SheetResult(medial, fitted, horizons, mesh, sharpened)
 
 

@@ -294,6 +294,7 @@ def build_control(
     fitted: FittedSheet,
     horizons: Horizons,
     points: Floats,
+    blocks: Floats,
     flatten: Flatten,
     options: ControlOptions,
     datum: str = "mid",
@@ -311,7 +312,9 @@ def build_control(
     horizons : Horizons
         Top and bottom, for the stratigraphic coordinate.
     points : (n, 3) float
-        Blocks, working units.
+        What the sheet was fitted to, working units.
+    blocks : (b, 3) float
+        Blocks as they were given, which the mesh has to hold.
     flatten : callable
         See Flatten.
     options : ControlOptions
@@ -342,7 +345,7 @@ def build_control(
     rungs.append(("refined", refined))
     if not (_room(columns, options.focal) < reach).any():
         rungs.insert(0, ("constant", constant))
-    climbed = climb(rungs, points, options.shrinks)
+    climbed = climb(rungs, blocks, options.shrinks)
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}

@@ -166,7 +166,7 @@ def climb(
         columns, laid = min(held, key=lambda found: found[:3])[3:]
         return Climbed(columns, laid, True, tuple(records))
     _, _, columns, layers, exam = min(flawed, key=lambda found: found[:2])
-    return _shrunk(columns, layers, exam, records, shrinks)
+    return _shrunk(columns, layers, exam, records, points, shrinks)
 
 
 def _blended(
@@ -234,7 +234,12 @@ def _untangled(columns: Columns, layers: Layers, exam: _Exam) -> tuple[Laid | No
 
 
 def _shrunk(
-    columns: Columns, layers: Layers, exam: _Exam, records: list[Rung], shrinks: int
+    columns: Columns,
+    layers: Layers,
+    exam: _Exam,
+    records: list[Rung],
+    points: Floats,
+    shrinks: int,
 ) -> Climbed:
     """Return prisms whose flaws are shrunk away; or, as they were, unproved."""
     first, mean = layers, neighbour_mean(layers.F, len(layers.P))
@@ -242,7 +247,8 @@ def _shrunk(
         layers = shrink(layers, np.unique(exam.vertices % len(layers.P)), mean)
         laid, exam = _proved(columns, layers)
         if laid is not None:
-            records.append(exam.rung("shrunk", step))
+            laid, outside, lost = _covering(laid, points)
+            records.append(replace(exam.rung("shrunk", step), outside=outside, lost=lost))
             return Climbed(columns, laid, True, tuple(records))
     records.append(exam.rung("shrunk", shrinks))
     laid = columns.lay_out(columns.surround(first)).without_shell()

@@ -241,13 +241,13 @@ def test_torn_blocks_are_an_error_unless_allowed(swelling, monkeypatch):
 
 
 def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling):
-    # A control mesh a block short of the body's top and bottom, and nothing around it.
-    short = SheetOptions(control=ControlOptions(pad=-1.0, pad_capped=-1.0))
+    # A control mesh two blocks short of the body's top and bottom, and nothing around it.
+    short = SheetOptions(control=ControlOptions(pad=-2.0, pad_capped=-2.0))
     with pytest.raises(ControlMeshError, match=r"lie outside the control mesh.*around"):
         gu.unfold(swelling, reach=0.0, sheet_options=short)
     u = gu.unfold(swelling, reach=0.0, sheet_options=short, allow_uncertified=True)
     empty = u.location == "outside"
-    assert 0 < empty.mean() < 0.1  # the outermost layers where the sheet swells; measured 0.02
+    assert 0.02 < empty.mean() < 0.5  # more than tents are raised over; some of nine layers
     assert np.isnan(u.points[empty]).all()
     assert np.isnan(u.columns["nmd_error"][empty]).all()
     assert np.isfinite(u.points[~empty]).all()

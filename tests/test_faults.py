@@ -44,6 +44,8 @@ class Run:
 
     def __init__(self, *argv: str, cwd: Path, script: str = "", **settings: object) -> None:
         self._master, slave = pty.openpty()
+        # Whoever runs the tests may ignore hang-ups (nohup does), which a run would heed.
+        settings.setdefault("preexec_fn", lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL))
         how = ["-c", script] if script else ["-m", "geounfold"]
         self.process = subprocess.Popen(
             [sys.executable, *how, *argv],

@@ -35,7 +35,7 @@ class Rung:
     Attributes
     ----------
     name : str
-        constant, capped, refined, shrunk, untangled.
+        constant, capped or refined as laid out; blended, untangled or shrunk where mended.
     inverted_folded, inverted_unfolded, crossing_folded, crossing_unfolded, unglued : int
         Flaws of the body's tetrahedra: how many are inverted, pairs of border faces that cross,
         vertices and tetrahedra where they are not glued to a manifold.
@@ -43,7 +43,7 @@ class Rung:
         Blocks that they do not hold, and those that the shell does not hold either; None where
         that was not asked.
     steps : int
-        Steps of shrinking it took, or vertices it started to untangle from.
+        Steps of blending or shrinking it took, or vertices it started to untangle from.
     """
 
     name: str

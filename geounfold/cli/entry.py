@@ -31,11 +31,13 @@ _COMMANDS = {
     "quality": "quality",
     "simulate": "simulate",
     "view": "view",
+    "grid": "blocks.grid",
+    "transfer": "blocks.transfer",
     "init": "init",
     "doctor": "doctor",
     "completion": "completion",
 }
-"""The commands, and their functions in `commands`."""
+"""The commands, and their functions in `commands` or another module."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -137,9 +139,11 @@ def _run(words: Sequence[str], console: Console) -> None:
 
 
 def _handlers() -> dict[str, Callable[..., None]]:
-    from geounfold.cli import commands
+    from geounfold.cli import blocks, commands
 
-    return {name: getattr(commands, function) for name, function in _COMMANDS.items()}
+    modules = {"": commands, "blocks": blocks}
+    places = {name: function.rpartition(".") for name, function in _COMMANDS.items()}
+    return {name: getattr(modules[home], function) for name, (home, _, function) in places.items()}
 
 
 @contextmanager

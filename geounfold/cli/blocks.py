@@ -1,0 +1,208 @@
+"""The commands for block models: a grid over unfolded blocks, values moved between the spaces."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.cli.console import Console
+from geounfold.errors import InputError, OptionError
+from geounfold.io import Outputs, PointTable, read_points, write_json
+from geounfold.io.coordinates import Triple, parse_columns
+from geounfold.io.formats import point_endings
+from geounfold.io.results import UNFOLDED
+from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
+
+if TYPE_CHECKING:
+    from geounfold.blockmodel import BlockModel, Transfer
+    from geounfold.mapping import UnfoldingMap
+    from geounfold.mesh import Bools, Floats
+
+_POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
+_JSON = (".json",)
+_SPACES = ("folded", "unfolded")
+
+
+def grid(args: Namespace, console: Console) -> None:
+    """Write a regular grid of blocks that covers unfolded points."""
+    sides = _numbers(args.sizes, "--sizes")
+    outputs = Outputs.planned(
+        {"--output": (args.output, TABLE_ENDINGS)},
+        [args.points, *([] if args.map is None else [args.map])],
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    if args.map is not None:
+        existing_file(Path(args.map))
+    table = _read(args.points, args.columns, args, console, (UNFOLDED,), gaps=True)
+    from geounfold import mapping
+    from geounfold.blockmodel import regular_grid
+
+    console.stage("making the grid")
+    blocks = regular_grid(table.points, np.array(sides))
+    if args.map is not None:
+        saved = mapping.load(args.map)
+        console.stage("finding the blocks in the body")
+        held = _held(saved, blocks)
+        if not held.any():
+            raise InputError(f"{args.map}: no block of the grid lies in this map's body")
+    else:
+        held = np.ones(len(blocks), dtype=bool)
+    index = np.rint(blocks.centroids / blocks.sizes - 0.5).astype(np.int64)
+    index -= index.min(axis=0)
+    columns = dict(zip("xyz", blocks.centroids[held].T, strict=True))
+    columns |= dict(zip(("dx", "dy", "dz"), blocks.sizes[held].T, strict=True))
+    columns |= dict(zip("ijk", index[held].T, strict=True))
+    with outputs.writing() as parts:
+        write_table(parts["--output"], pd.DataFrame(columns))
+    count = int(np.count_nonzero(held))
+    console.done(f"{count} blocks written into {args.output}")
+    console.answer({"blocks": count, "covering": len(blocks), "sizes": list(sides)})
+
+
+def transfer(args: Namespace, console: Console) -> None:
+    """Move values between blocks of the two spaces, weighted by volume."""
+    if args.to not in _SPACES:
+        raise OptionError(f"--to must be folded or unfolded, not '{args.to}'")
+    split = _whole(args.split, "--split")
+    outputs = Outputs.planned(
+        {"--output": (args.output, _POINTS_OUT), "--summary": (args.summary, _JSON)},
+        [args.map, args.source, args.target],
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    existing_file(Path(args.map))
+    back = args.to == "folded"
+    flat: tuple[Triple, ...] = (UNFOLDED,)
+    source = _read(args.source, args.source_columns, args, console, flat if back else ())
+    target = _read(args.target, args.target_columns, args, console, () if back else flat)
+    names = _value_columns(args.values, source)
+    target.check_writable(args.output)
+    values = np.column_stack([source.numbers(name) for name in names])
+    axes = _axes(args.rotation)
+    from geounfold import mapping
+    from geounfold.blockmodel import transfer as moved
+
+    saved = mapping.load(args.map)
+    level = np.eye(3)
+    from_blocks = _blocks(source, args.source_sizes, level if back else axes)
+    to_blocks = _blocks(target, args.target_sizes, axes if back else level)
+    console.stage("moving values")
+    carry = saved.to_flat if back else saved.to_folded
+    result = moved(from_blocks, values, to_blocks, carry, split=split)
+    columns: dict[str, Any] = {}
+    for k, name in enumerate(names):
+        columns |= {name: result.means[:, k], f"{name}_share": result.share[:, k]}
+    facts = _facts(names, result)
+    with outputs.writing() as parts:
+        target.write(parts["--output"], columns)
+        if "--summary" in parts:
+            write_json(parts["--summary"], facts)
+    for name in names:
+        lost = facts["values"][name]["unassigned"]
+        if lost:
+            console.warn(
+                f"{args.target}: {lost} of {len(target)} blocks got no value of {name}: no block "
+                f"of {args.source} that has one lies at their image"
+            )
+    console.done(f"{len(names)} values moved onto {len(target)} blocks in {args.output}")
+    console.answer(facts)
+
+
+def _facts(names: list[str], result: Transfer) -> dict[str, Any]:
+    """Return what was moved, and whether volume times value was kept."""
+    lost = np.count_nonzero(~result.assigned, axis=0)
+    partly = np.count_nonzero(result.assigned & (result.share < 1), axis=0)
+    return {
+        "blocks": len(result.volumes),
+        "values": {
+            name: {
+                "unassigned": int(lost[k]),
+                "partly_assigned": int(partly[k]),
+                "source_total": float(result.total[k]),
+                "target_total": float(result.carried[k]),
+            }
+            for k, name in enumerate(names)
+        },
+    }
+
+
+def _held(saved: UnfoldingMap, blocks: BlockModel) -> Bools:
+    """Return which blocks of the flat space have a part in the control mesh, (n,)."""
+    from geounfold.blockmodel.model import chunks
+
+    held = np.zeros(len(blocks), dtype=bool)
+    for rows in chunks(len(blocks), 1 << 15):
+        parts = blocks.sub_points(2, rows)
+        inside = saved.carry(parts.reshape(-1, 3), inverse=True).inside
+        held[rows] = inside.reshape(parts.shape[:2]).any(axis=1)
+    return held
+
+
+def _read(
+    path: str,
+    columns: str | None,
+    args: Namespace,
+    console: Console,
+    prefer: tuple[Triple, ...],
+    *,
+    gaps: bool = False,
+) -> PointTable:
+    """Read points; with `gaps`, rows without coordinates (no image) are passed over."""
+    console.stage(f"reading {path}")
+    names = None if columns is None else parse_columns(columns)
+    drop = gaps or args.drop_invalid
+    table = read_points(path, names, prefer=prefer, drop_invalid=drop)
+    if len(table.dropped):
+        console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
+    return table
+
+
+def _value_columns(text: str, source: PointTable) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(names) or len(set(names)) < len(names):
+        raise OptionError(f"--values needs different column names such as AU,CU, not '{text}'")
+    missing = [name for name in names if name not in source.frame.columns]
+    if missing:
+        raise InputError(f"{source.source}: no column '{missing[0]}' for --values")
+    return names
+
+
+def _blocks(table: PointTable, sizes: str | None, axes: Floats | None) -> BlockModel:
+    """Return a table's blocks; `sizes` are three columns or three lengths."""
+    from geounfold.blockmodel import block_model
+
+    given: Triple | tuple[float, float, float] | None = None
+    if sizes is not None:
+        words = [word.strip() for word in sizes.split(",")]
+        try:
+            a, b, c = (float(word) for word in words)
+        except ValueError:
+            given = parse_columns(sizes)
+        else:
+            given = (a, b, c)
+    return block_model(table.frame, table.points, given, axes, source=table.source)
+
+
+def _axes(text: str | None) -> Floats | None:
+    from geounfold.blockmodel import axes_from_angles
+
+    return None if text is None else axes_from_angles(*_numbers(text, "--rotation"))
+
+
+def _numbers(text: str, option: str) -> tuple[float, float, float]:
+    try:
+        a, b, c = (float(word) for word in text.split(","))
+    except ValueError as error:
+        raise OptionError(f"{option} needs three numbers such as 10,10,5, not '{text}'") from error
+    return a, b, c
+
+
+def _whole(text: str, option: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
+    return int(text)

@@ -15,6 +15,13 @@ from typing import TYPE_CHECKING, Any
 from geounfold._version import __version__
 
 if TYPE_CHECKING:
+    from geounfold.blockmodel import (
+        BlockModel,
+        axes_from_angles,
+        block_model,
+        regular_grid,
+        transfer,
+    )
     from geounfold.comparison import compare
     from geounfold.control import ControlMesh
     from geounfold.drillholes import DrillHoles, read_drillholes
@@ -29,6 +36,11 @@ if TYPE_CHECKING:
     from geounfold.synthetic import simulate
 
 _HOMES = {
+    "BlockModel": "blockmodel",
+    "axes_from_angles": "blockmodel",
+    "block_model": "blockmodel",
+    "regular_grid": "blockmodel",
+    "transfer": "blockmodel",
     "compare": "comparison",
     "ControlMesh": "control",
     "DrillHoles": "drillholes",
@@ -55,6 +67,7 @@ _HOMES = {
 
 __all__ = [
     "FLATTENERS",
+    "BlockModel",
     "ControlMesh",
     "DrillHoles",
     "Flattening",
@@ -68,6 +81,8 @@ __all__ = [
     "UnfoldingMap",
     "__version__",
     "aligned_rms",
+    "axes_from_angles",
+    "block_model",
     "compare",
     "epsilon",
     "flatten",
@@ -75,7 +90,9 @@ __all__ = [
     "neighbours",
     "nmd",
     "read_drillholes",
+    "regular_grid",
     "simulate",
+    "transfer",
     "unfold",
 ]
 

@@ -341,6 +341,17 @@ def test_spring_converges_in_few_steps_from_a_good_start():
     assert np.abs(edge_errors((V, F), flat.uv)).max() < 1e-12
 
 
+def test_a_rough_first_step_changes_nothing_but_the_time(monkeypatch):
+    # A single step of conjugate gradients is never enough, so the Hessian is factored at once.
+    rough = flatten(cap())
+    monkeypatch.setattr(sys.modules[SpringOptions.__module__], "ROUGH_STEPS", 1)
+    exact = flatten(cap())
+    assert not np.array_equal(rough.energy[2], exact.energy[2])  # the first step differs
+    assert rough.stop is exact.stop is Stop.CONVERGED
+    assert rough.energy[-1] == pytest.approx(exact.energy[-1], rel=1e-12)
+    assert_allclose(rough.uv, exact.uv, atol=1e-9)  # the cap is 1.3 wide
+
+
 def nearly_closed():
     """A sphere open at a small hole: its springs crumple when they may."""
     S, F = grid(24, 9)

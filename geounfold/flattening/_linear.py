@@ -36,23 +36,34 @@ def incidence(edges: Ints, n: int) -> sp.csr_array:
     return sp.csr_array((np.tile([-1.0, 1.0], k), (rows, edges.ravel())), shape=(k, n))
 
 
-def pinned_solver(laplacian: sp.csc_array) -> tuple[Callable[[Floats], Floats], Ints]:
-    """Return a solver of ``L x = b`` (b sums to zero) with x[0] = 0, and a fill-reducing order.
+class PinnedSolver:
+    """Solves ``L x = b`` (b sums to zero) with x[0] = 0, for a Laplacian L factored once.
 
-    The order gives each vertex's place, (n,); vertex 0 comes last.
+    Parameters
+    ----------
+    laplacian : (n, n) sparse
+        Symmetric, its rows sum to zero.
+
+    Attributes
+    ----------
+    place : (n,) int
+        A fill-reducing order, as each vertex's place in it; vertex 0 comes last.
     """
-    n = laplacian.shape[0]
-    lu = factor(sp.csc_array(laplacian[1:, 1:]))
 
-    def solve(b: Floats) -> Floats:
+    place: Ints
+
+    def __init__(self, laplacian: sp.csc_array) -> None:
+        n = laplacian.shape[0]
+        self._factors = factor(sp.csc_array(laplacian[1:, 1:]))
+        self.place = np.empty(n, dtype=np.int64)
+        self.place[1:] = self._factors.perm_c
+        self.place[0] = n - 1
+
+    def solve(self, b: Floats) -> Floats:
+        """Return x for one or several right-hand sides, (n,) or (n, k)."""
         out = np.zeros_like(b)
-        out[1:] = lu.solve(np.ascontiguousarray(b[1:]))
+        out[1:] = self._factors.solve(np.ascontiguousarray(b[1:]))
         return out
-
-    place = np.empty(n, dtype=np.int64)
-    place[1:] = lu.perm_c
-    place[0] = n - 1
-    return solve, place
 
 
 def preconditioned_solve(

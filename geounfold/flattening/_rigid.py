@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from geounfold.flattening._linear import incidence, pinned_solver
+from geounfold.flattening._linear import PinnedSolver, incidence
 from geounfold.flattening._problem import Problem, displacement, flip_count
-from geounfold.mesh import Floats, Ints
+from geounfold.mesh import Floats
 
 
 class RigidSteps:
@@ -18,11 +18,11 @@ class RigidSteps:
 
     Attributes
     ----------
-    place : (n,) int
-        A fill-reducing order of the vertices, as found for the Laplacian.
+    laplacian : PinnedSolver
+        Solves the cotangent Laplacian's systems; holds a fill-reducing order of the vertices.
     """
 
-    place: Ints
+    laplacian: PinnedSolver
 
     def __init__(self, problem: Problem) -> None:
         F, z = problem.mesh.F, problem.corners
@@ -38,7 +38,7 @@ class RigidSteps:
         transposed.data *= cotangent.ravel()[transposed.indices] / 2
         self._gather = transposed
         self._pull = cotangent * np.conj(self._side)
-        self._solve, self.place = pinned_solver(sp.csc_array(self._gather @ self._difference))
+        self.laplacian = PinnedSolver(sp.csc_array(self._gather @ self._difference))
 
     def __call__(self, uv: Floats) -> Floats:
         """Return the positions after one step, (n, 2), centred."""
@@ -46,7 +46,7 @@ class RigidSteps:
         turn = (self._pull * now).sum(axis=1)
         turn /= np.maximum(np.abs(turn), np.finfo(float).tiny)
         load = self._gather @ (turn[:, None] * self._side).ravel()
-        out = self._solve(np.column_stack([load.real, load.imag]))
+        out = self.laplacian.solve(np.column_stack([load.real, load.imag]))
         centred: Floats = out - out.mean(axis=0)
         return centred
 

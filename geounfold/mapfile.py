@@ -31,7 +31,9 @@ from numpy.typing import NDArray
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
+OLDEST = 2
+"""First of the versions that can be read."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -92,8 +94,14 @@ ARRAYS: Mapping[str, Layout] = {
     "tetrahedra": Layout(_INDEX, ("tetrahedra", 4), below="vertices"),
     "shell": Layout(_INDEX, ("shell?", 4), below="vertices"),
     "stratigraphic": Layout(_FLOAT, ("vertices",)),
+    "coordinates": Layout(
+        _INDEX, (), holds=lambda a: bool(0 <= a <= 2), must="be 0, 1 or 2 (tet, wachspress, mvc)"
+    ),
 }
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
+
+ADDED: Mapping[str, tuple[int, Any]] = {"coordinates": (3, 0)}
+"""Arrays that not every version has: the first that has it, and what it is in those before."""
 
 _HEAD: Mapping[str, Layout] = {
     "format": Layout(f"<U{len(FORMAT)}", ()),
@@ -185,13 +193,16 @@ def read_arrays(path: str | Path) -> Arrays:
             members = _members(archive, len(content), path)
             head = {n: _array(archive, members, n, path) for n in ("format", "version")}
             _check_version(head, path)
-            _check_names({*members}, {f"{n}.npy" for n in (*_HEAD, *ARRAYS)}, str(path))
-            rest = {n: _array(archive, members, n, path) for n in ("checksum", *ARRAYS)}
+            late = {n for n, (first, _) in ADDED.items() if int(head["version"]) < first}
+            names = [n for n in ARRAYS if n not in late]
+            _check_names({*members}, {f"{n}.npy" for n in (*_HEAD, *names)}, str(path))
+            rest = {n: _array(archive, members, n, path) for n in ("checksum", *names)}
     except _DAMAGE as error:
         raise InputError(f"{path}: not a geounfold map, or a damaged one; save it again") from error
     stored = rest.pop("checksum")
     if str(stored) != _checksum({**head, **rest}):
         raise InputError(f"{path}: the map file is damaged (checksum differs); save it again")
+    rest.update({n: np.array(ADDED[n][1], ARRAYS[n].dtype) for n in late})
     _check_arrays(rest, str(path))
     return rest
 
@@ -268,10 +279,10 @@ def _check_version(head: Arrays, path: Path) -> None:
             f"{path}: map version {version} is newer than this geounfold reads "
             f"({FORMAT_VERSION}); upgrade geounfold"
         )
-    if version < FORMAT_VERSION:
+    if version < OLDEST:
         raise InputError(
             f"{path}: map version {version} is older than this geounfold reads "
-            f"({FORMAT_VERSION}); unfold again with --map"
+            f"({OLDEST}); unfold again with --map"
         )
 
 

@@ -12,7 +12,9 @@ import numpy as np
 
 from geounfold.backends.igl import SurfaceIndex, TetIndex, barycentric_in_tets
 from geounfold.control import ControlMesh
-from geounfold.errors import InputError
+from geounfold.coordinates import COORDINATES, PrismInterpolant
+from geounfold.distortion import deformation_gradients
+from geounfold.errors import InputError, OptionError
 from geounfold.frame import Frame
 from geounfold.geometry import boundary_faces
 from geounfold.mapfile import read_arrays, write_arrays
@@ -46,6 +48,9 @@ class Carried:
         ``len(control.folded.T)`` on of the shell around it; -1 where there is no image.
     distance : (n,) float
         From the control mesh, in the space the points were given in and their unit; 0 inside.
+    unsolved : int
+        Points in a prism for which no image was found: its coordinates have no closed inverse.
+        They have none, then, and are not placed; always 0 with the coordinates of tetrahedra.
     """
 
     points: Floats
@@ -54,11 +59,12 @@ class Carried:
     placed: Bools
     element: Ints
     distance: Floats
+    unsolved: int = 0
 
     @property
     def location(self) -> np.ndarray:
         """``inside``, ``extrapolated`` or ``outside`` (no image) for every point, (n,) of str."""
-        return np.where(self.inside, INSIDE, np.where(self.placed, EXTRAPOLATED, OUTSIDE))
+        return np.where(self.placed, np.where(self.inside, INSIDE, EXTRAPOLATED), OUTSIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +180,15 @@ class UnfoldingMap:
         (blocks).  A shell may end nearer, where limbs or a hinge's inner side leave no room.
     known : sequence of TetIndex, optional
         Trees already built, used where they are over a space of the control mesh.
+    coordinates : str
+        ``tet``: the map is affine in every tetrahedron.  ``wachspress`` or ``mvc``: points in
+        prisms go by coordinates of the prism's corners, which is smooth inside; the inverse is
+        found by Newton's method to 1e-12 of the mesh's size.
+
+    Raises
+    ------
+    OptionError
+        Unknown coordinates.
     """
 
     def __init__(
@@ -183,7 +198,12 @@ class UnfoldingMap:
         shell: ControlMesh | None = None,
         reach: float = REACH,
         known: Sequence[TetIndex] = (),
+        coordinates: str = "tet",
     ) -> None:
+        if coordinates not in COORDINATES:
+            valid = ", ".join(COORDINATES)
+            raise OptionError(f"unknown coordinates {coordinates!r}; valid: {valid}")
+        self.coordinates = coordinates
         self.frame = frame
         self.control = control
         self.shell = shell
@@ -211,6 +231,13 @@ class UnfoldingMap:
             TetMesh(self.shell.unfolded.V, T),
             self.shell.stratigraphic,
         )
+
+    @cached_property
+    def prisms(self) -> PrismInterpolant | None:
+        """The prisms and their coordinates; None where the tetrahedra carry all points."""
+        if self.coordinates == "tet":
+            return None
+        return PrismInterpolant.of(self.whole, self.coordinates)
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
         """Carry points to the flat space, or with ``inverse`` from it back.
@@ -246,13 +273,59 @@ class UnfoldingMap:
         mesh = self.whole.folded if inverse else self.whole.unfolded
         corners = mesh.T[np.maximum(place.element, 0)]
         image = np.einsum("ij,ijk->ik", place.weights, mesh.V[corners])
-        out = self.frame.to_world(image) if inverse else image * scale
         stratigraphic = np.einsum("ij,ij->i", place.weights, self.whole.stratigraphic[corners])
         placed = place.element >= 0
+        rows, solved = self._by_prisms(work, place, image, stratigraphic, inverse=inverse)
+        placed[rows[~solved]] = False
+        out = self.frame.to_world(image) if inverse else image * scale
         out[~placed] = np.nan
         stratigraphic[~placed] = np.nan
         distance = place.distance * scale
-        return Carried(out, stratigraphic, place.inside, placed, place.element, distance)
+        unsolved = int((~solved).sum())
+        return Carried(out, stratigraphic, place.inside, placed, place.element, distance, unsolved)
+
+    def _by_prisms(
+        self, work: Floats, place: _Place, image: Floats, stratigraphic: Floats, *, inverse: bool
+    ) -> tuple[Ints, Bools]:
+        """Put what prisms carry into image (n, 3) and stratigraphic (n,), working units.
+
+        Return the rows they carry, and which of these have an image.
+        """
+        if self.prisms is None:
+            return np.empty(0, np.int64), np.empty(0, bool)
+        rows = self.prisms.held(place.element, place.weights)
+        element, solved = place.element[rows], np.ones(len(rows), bool)
+        if inverse:
+            found = self.prisms.back(work[rows], element, image[rows])
+            image[rows], stratigraphic[rows], solved = found
+        else:
+            image[rows], stratigraphic[rows] = self.prisms.carry(work[rows], element)
+        return rows, solved
+
+    def gradients(self, points: Floats, element: Ints) -> Floats:
+        """Return the deformation gradient at folded points, folded to unfolded.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In the data's coordinates.
+        element : (n,) int
+            The tetrahedron that carries each (see Carried), none of them -1.
+
+        Returns
+        -------
+        (n, 3, 3) float
+            As ``deformation_gradients``, folded directions in the working frame; that of the
+            prism's coordinates where a prism carries the point.
+        """
+        used, back = np.unique(element, return_inverse=True)
+        out = deformation_gradients(self.whole, used)[back]
+        if self.prisms is not None and len(points):
+            work, folded = self.frame.to_work(points), self.whole.folded
+            share = barycentric_in_tets(work, folded.V, folded.T[element])
+            rows = self.prisms.held(element, share)
+            out[rows] = self.prisms.gradients(work[rows], element[rows])
+        return out
 
     def to_flat(self, points: Floats) -> Floats:
         """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
@@ -275,6 +348,7 @@ class UnfoldingMap:
             "scale": np.array(frame.scale),
             "steps": np.full(3, np.nan) if frame.steps is None else frame.steps,
             "reach": np.array(self.reach),
+            "coordinates": np.array(COORDINATES.index(self.coordinates)),
             "folded": whole.folded.V,
             "unfolded": whole.unfolded.V,
             "inner": np.array(len(self.control.folded.V)),
@@ -297,7 +371,7 @@ def _spread(carried: Carried, rows: Bools) -> Carried:
     points[rows], stratigraphic[rows] = carried.points, carried.stratigraphic
     inside[rows], placed[rows] = carried.inside, carried.placed
     element[rows], distance[rows] = carried.element, carried.distance
-    return Carried(points, stratigraphic, inside, placed, element, distance)
+    return Carried(points, stratigraphic, inside, placed, element, distance, carried.unsolved)
 
 
 def checked_points(points: Floats) -> Floats:
@@ -334,4 +408,5 @@ def load(path: str | Path) -> UnfoldingMap:
     shell = None
     if len(S):
         shell = ControlMesh(TetMesh(whole[0], S), TetMesh(whole[1], S), whole[2])
-    return UnfoldingMap(frame, control, shell, float(arrays["reach"]))
+    coordinates = COORDINATES[int(arrays["coordinates"])]
+    return UnfoldingMap(frame, control, shell, float(arrays["reach"]), coordinates=coordinates)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from geounfold.control import DATUMS
+from geounfold.coordinates import COORDINATES
 from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
 from geounfold.hull import HULLS, HullOptions
@@ -28,6 +29,7 @@ VALID: dict[str, tuple[str, ...]] = {
     "hull": ("auto", *HULLS),
     "split": tuple(SPLITS),
     "datum": DATUMS,
+    "coordinates": COORDINATES,
 }
 """Valid values of the options that have names for them."""
 
@@ -58,6 +60,10 @@ class UnfoldOptions:
         Which surface is flat: ``mid``, ``top``, ``bottom``, or ``proportional`` (both).
     body : int, "all" or None
         Which of several separate bodies to unfold, 0 the largest; None when there is one.
+    coordinates : str
+        How points go between the control mesh's vertices: by those of the tetrahedron (``tet``),
+        which is proved one-to-one, or of the prism, which is smooth inside it but not proved:
+        ``wachspress`` (mean value where a prism is not convex) or ``mvc`` (mean value).
     neighbours : int
         Neighbours per point in NMD and epsilon.
     reach : float
@@ -85,6 +91,7 @@ class UnfoldOptions:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     datum: str = "mid"
     body: int | str | None = None
+    coordinates: str = "tet"
     neighbours: int = NEIGHBOURS
     reach: float = REACH
     allow_uncertified: bool = False

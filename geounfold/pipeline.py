@@ -22,6 +22,7 @@ from geounfold.certificate import Certificate, certify
 from geounfold.cloud import QUIET, unevenness
 from geounfold.config import to_toml
 from geounfold.control import ControlMesh, scaled, side_by_side
+from geounfold.coordinates import PrismInterpolant
 from geounfold.display import Facts
 from geounfold.disturbed import disturbed_lattice
 from geounfold.errors import ControlMeshError, InputError
@@ -33,7 +34,7 @@ from geounfold.hull import Hull
 from geounfold.io.results import FOLDED, UNFOLDED, frame_points, result_columns, with_carried
 from geounfold.lattice import Lattice, measure_lattice
 from geounfold.mapping import Carried, UnfoldingMap, checked_points
-from geounfold.mesh import Floats, Ints, Space, TriMesh, as_trimesh, in_space
+from geounfold.mesh import Bools, Floats, Ints, Space, TriMesh, as_trimesh, in_space
 from geounfold.options import UnfoldOptions
 from geounfold.quality import SUSPECT, Quality, assess, torn_blocks
 from geounfold.solid import solid_cells
@@ -145,8 +146,12 @@ def unfold(
     _check_placed(groups, P, carried, chosen)
     with clock.stage("quality"):
         world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
-        quality = assess(world, whole, carried.element, P, carried.points, chosen.neighbours)
+        gradients = _gradients(mapping, P, carried)
+        quality = assess(
+            world, whole, carried.element, P, carried.points, chosen.neighbours, gradients
+        )
         torn = _torn(groups, given, carried, quality, frame)
+    _check_coordinates(quality, back, P, chosen)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
     return Unfolding(
@@ -194,6 +199,40 @@ def _check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
         f"{len(torn)} of {len(folded)} blocks were torn from their neighbours, around ({where}): "
         "limbs too close together, or a sheet too narrow for its thickness; try another --hull, "
         "or --allow-uncertified to write the answer all the same"
+    )
+
+
+def _gradients(mapping: UnfoldingMap, folded: Floats, carried: Carried) -> Floats | None:
+    """Return the gradients at points with an image; None where they are the tetrahedra's."""
+    if mapping.prisms is None:
+        return None
+    return mapping.gradients(folded[carried.placed], carried.element[carried.placed])
+
+
+def _lost_inside(carried: Carried) -> Bools:
+    """Return which points have no image though the mesh holds them: no inverse was found."""
+    return carried.inside & ~carried.placed
+
+
+def _check_coordinates(
+    quality: Quality, back: Carried, folded: Floats, options: UnfoldOptions
+) -> None:
+    """Raise ControlMeshError where a prism's coordinates fold or do not come back.
+
+    Unless that is allowed.  That they do neither at any block is no proof.
+    """
+    if options.coordinates == "tet" or options.allow_uncertified:
+        return
+    over = quality.blocks.volume_ratio <= 0
+    lost = _lost_inside(back)
+    wrong = over | lost
+    if not wrong.any():
+        return
+    where = ", ".join(f"{c:.6g}" for c in np.median(folded[wrong], axis=0))
+    raise ControlMeshError(
+        f"{options.coordinates} coordinates turn {int(over.sum())} of {len(folded)} blocks inside "
+        f"out and bring {int(lost.sum())} not back, around ({where}): use --coordinates tet, or "
+        "--allow-uncertified to write the answer all the same"
     )
 
 
@@ -258,7 +297,7 @@ def _mapping(fits: list[BodyFit], frame: Frame, options: UnfoldOptions) -> Unfol
         none = np.empty(0, np.int64)
         if not certify(control, shell, none).injective:
             control, shell = side_by_side([(f.control, None) for f in fits])
-    return UnfoldingMap(frame, control, shell, reach)
+    return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates)
 
 
 def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
@@ -332,6 +371,7 @@ class Unfolding:
         self.certificate = certificate
         self.seconds = seconds
         self._returned = back.points
+        self._unsolved = _lost_inside(back)
         self._fitted_points = fitted_points
         self._torn = torn
         self._given = None if given is None else given.copy()
@@ -482,8 +522,8 @@ class Unfolding:
 
     @property
     def round_trip_max(self) -> float:
-        """Largest distance, over the points that have an image, between a point and its return."""
-        placed = self.carried.placed
+        """Largest distance between a point and its return, over those that have both."""
+        placed = self.carried.placed & ~self._unsolved
         if not placed.any():
             return 0.0
         return float(np.linalg.norm(self._returned - self.folded, axis=1)[placed].max())
@@ -511,7 +551,8 @@ class Unfolding:
             "control_mesh": self._control_summary(),
             "inverted_folded": certificate.inverted_folded,
             "inverted_unfolded": certificate.inverted_unfolded,
-            "injective": certificate.injective,
+            "injective": self.injective,
+            "coordinates": self._coordinates_summary(),
             "certificate": certificate.as_dict(),
             "outside_share": self.outside_share,
             "outside": self._outside_summary(),
@@ -520,6 +561,37 @@ class Unfolding:
             **self.quality.summary(),
             "warnings": self._warnings(),
         }
+
+    @property
+    def injective(self) -> bool:
+        """Whether the map is proved one-to-one: the certificate speaks of tetrahedra alone."""
+        return self.certificate.injective and self.map.prisms is None
+
+    @property
+    def _faults(self) -> list[str]:
+        """What stands against a proof that the map is one-to-one; empty where there is one."""
+        faults = [] if self.certificate.injective else self.certificate.faults
+        if self.map.prisms is None:
+            return faults
+        return [*faults, f"{self.map.coordinates} coordinates, which no theorem covers"]
+
+    def _coordinates_summary(self) -> dict[str, Any]:
+        prisms = self.map.prisms
+        out: dict[str, Any] = {"name": self.map.coordinates, "proved": self.injective}
+        if prisms is None:
+            return out
+        return {
+            **out,
+            **prisms.counts(),
+            "blocks_in_prisms": self._in_prisms(prisms),
+            "blocks_inside_out": int((self.quality.blocks.volume_ratio <= 0).sum()),
+            "blocks_not_brought_back": int(self._unsolved.sum()),
+            "tolerance": prisms.tolerance * self.frame.scale,
+        }
+
+    def _in_prisms(self, prisms: PrismInterpolant) -> int:
+        element = self.carried.element[self.carried.placed]
+        return int((prisms.prism[element] >= 0).sum())
 
     def _lattice_summary(self) -> dict[str, Any]:
         spacing = self.frame.scale
@@ -591,8 +663,10 @@ class Unfolding:
             )
         if self._torn:
             out.append(f"{self._torn} blocks were torn from their neighbours")
-        if not self.certificate.injective:
-            out.append(f"the map is not proved one-to-one: {', '.join(self.certificate.faults)}")
+        if not self.injective:
+            out.append(f"the map is not proved one-to-one: {', '.join(self._faults)}")
+        if self._unsolved.any():
+            out.append(f"{int(self._unsolved.sum())} points were not brought back by the map")
         return out
 
     def _facts(self) -> Facts:
@@ -601,7 +675,7 @@ class Unfolding:
             bodies=len(self.fits),
             outside=int((~self.carried.inside).sum()),
             method=self.options.method,
-            faults=() if self.certificate.injective else self.certificate.faults,
+            faults=self._faults,
             checked=self.certificate.tetrahedra,
             epsilon=self.quality.nmd.mean,
             epsilon_p95=self.quality.nmd.p95,

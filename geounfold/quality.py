@@ -462,7 +462,7 @@ class BlockQuality:
     Attributes
     ----------
     volume_ratio, stretch_min, stretch_max, shear : (n,) float
-        Of the tetrahedron that carried the block (see Distortion).
+        Of the tetrahedron or prism that carried the block, there (see Distortion).
     nmd_error : (n,) float
         epsilon(X, Y) of the block (see `epsilon`).
     """
@@ -479,7 +479,12 @@ class BlockQuality:
 
 
 def block_quality(
-    control: ControlMesh, elements: Ints, folded: Floats, unfolded: Floats, k: int = NEIGHBOURS
+    control: ControlMesh,
+    elements: Ints,
+    folded: Floats,
+    unfolded: Floats,
+    k: int = NEIGHBOURS,
+    gradients: Floats | None = None,
 ) -> BlockQuality:
     """Return the distortion at each block.
 
@@ -494,6 +499,8 @@ def block_quality(
         The blocks in both spaces, in the same unit.
     k : int
         Number of neighbours of epsilon.
+    gradients : (p, 3, 3) float, optional
+        Deformation gradients at the p blocks that have an image; by default their tetrahedra's.
 
     Raises
     ------
@@ -511,8 +518,11 @@ def block_quality(
             f"elements name {rows.min()}..{rows.max()}, but there are {count} tetrahedra"
         )
     placed = rows >= 0
-    used, back = np.unique(rows[placed], return_inverse=True)
-    d = distortion(deformation_gradients(control, used))
+    if gradients is None:
+        used, back = np.unique(rows[placed], return_inverse=True)
+        d = distortion(deformation_gradients(control, used))
+    else:
+        d, back = distortion(gradients), np.arange(len(gradients))
 
     def spread(values: Floats) -> Floats:
         out = np.full(len(rows), np.nan)
@@ -573,6 +583,7 @@ def assess(
     folded: Floats,
     unfolded: Floats,
     k: int = NEIGHBOURS,
+    gradients: Floats | None = None,
 ) -> Quality:
     """Return the quality of an unfolding, over the blocks that have an image.
 
@@ -582,10 +593,10 @@ def assess(
         The body's tetrahedra.
     whole : ControlMesh
         Those and the shell around them, which ``elements`` name.
-    elements, folded, unfolded, k
+    elements, folded, unfolded, k, gradients
         As for `block_quality`, errors too.
     """
-    blocks = block_quality(whole, elements, folded, unfolded, k)
+    blocks = block_quality(whole, elements, folded, unfolded, k, gradients)
     placed = np.asarray(elements) >= 0
     before = tet_volumes(control.folded.V, control.folded.T)
     after = tet_volumes(control.unfolded.V, control.unfolded.T)

@@ -248,6 +248,8 @@ def verdict(summary: Mapping[str, Any]) -> Verdict:
     level, headline = "care", "Usable: nothing is inverted. That it is one to one is not proved."
     if any(inverted):
         level, headline = "bad", "The map folds over itself: do not use it as it is."
+    elif proved is False and _mapping(summary.get("certificate")).get("injective") is True:
+        headline = "Usable: the tetrahedra are one to one; between their corners it is not proved."
     elif proved is False:
         level, headline = "bad", "The map is not proved one to one: do not use it as it is."
     elif None in inverted:
@@ -268,8 +270,14 @@ def _reasons(summary: Mapping[str, Any]) -> Iterable[str]:
         yield (
             f"Proved: {certificate['tetrahedra']} tetrahedra, none inverted, and "
             f"{certificate['boundary_faces']} border faces, none crossing, in both spaces, by "
-            "exact predicates; so the map is one to one (Lipman 2014)."
+            "exact predicates; so their map is one to one (Lipman 2014)."
         )
+        used = _mapping(summary.get("coordinates")).get("name", "tet")
+        if used != "tet":
+            yield (
+                f"Not proved: inside the prisms points go by {used} coordinates of their corners, "
+                "not by the tetrahedra's; the blocks were there and back, and none inside out."
+            )
     elif certificate:
         yield (
             f"Not proved: {_number(certificate['crossing_folded'])} pairs of border faces cross in "

@@ -44,6 +44,7 @@ class FakeMap:
             stratigraphic=points[:, 2] / 10,
             location=location,
             distance=np.maximum(-points[:, 0], 0),
+            unsolved=0,
         )
 
 

@@ -43,7 +43,10 @@ _HTML = (".html", ".htm")
 _PICTURE = (".png",)
 _TOML = (".toml",)
 _TRUE: Triple = ("true_x", "true_y", "true_z")
-_MODEL = ("method", "flattener", "hull", "split", "up", "datum", "body", "neighbours", "reach")
+_MODEL = (
+    *("method", "flattener", "hull", "split", "up", "datum", "coordinates", "body"),
+    *("neighbours", "reach"),
+)
 
 
 def unfold(args: Namespace, console: Console) -> None:
@@ -157,8 +160,10 @@ def carry(args: Namespace, console: Console) -> None:
     saved = mapping.load(args.map)
     console.stage("carrying points")
     columns: dict[str, Any] = {}
+    unsolved = 0
     if table is not None and args.inverse:
-        columns = result_columns(FOLDED, saved.carry(table.points, inverse=True))
+        back = saved.carry(table.points, inverse=True)
+        columns, unsolved = result_columns(FOLDED, back), back.unsolved
     elif table is not None:
         columns = result_columns(UNFOLDED, saved.carry(table.points))
     traced = {} if holes is None else holes.carried(_flat(saved))
@@ -169,6 +174,11 @@ def carry(args: Namespace, console: Console) -> None:
             holes.write(parts, traced)
     if table is not None:
         _warn_of_outside(args.points, columns, console)
+    if unsolved:
+        console.warn(
+            f"{args.points}: {unsolved} points lie inside the control mesh, but the inverse of its "
+            f"{saved.coordinates} coordinates was not found there; they were left empty too"
+        )
     for name, result in traced.items():
         _warn_of_outside(f"the holes' {name}", result, console)
     carried = {args.output: columns, args.samples_out: traced.get("samples", {})}

@@ -250,6 +250,13 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
         **given,
     )
     group.add_argument(
+        "--coordinates",
+        metavar="K",
+        help="tet (default; proved one-to-one), wachspress or mvc: what carries points between "
+        "the control mesh's vertices, its tetrahedra or its prisms",
+        **given,
+    )
+    group.add_argument(
         "--body", metavar="N", help="which of several separate bodies, or all", **given
     )
     group.add_argument(

@@ -1,0 +1,59 @@
+"""Wachspress coordinates in convex prisms with split quadrilaterals."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from geounfold.coordinates._prism import TRIANGLES, cross, dot, face_normals, fans
+from geounfold.mesh import Floats
+
+_FANS = fans()
+
+
+def wachspress(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """Return Wachspress coordinates of points inside convex prisms, and their gradients.
+
+    With p = n / h, the outward normal of a face over the point's distance from it, the weight of
+    a corner is the volume under the facet of the polar dual that the p of the faces around the
+    corner span, ``sum det(p_1, p_j, p_j+1)``; its gradient is ``sum det(...) (p_1 + p_j + p_j+1)``
+    (Ju, Schaefer, Warren and Desbrun 2005, "A geometric construction of coordinates for convex
+    polyhedra using polar duals"; Floater, Gillette and Sukumar 2014, "Gradient bounds for
+    Wachspress coordinates on polytopes", section 3).  They are rational, positive inside, and
+    linear on every triangle of a strictly convex border.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Inside; on the border the weights have no finite value.
+    corners : (n, 6, 3) float
+        The prism of each point, strictly convex.
+
+    Returns
+    -------
+    values : (n, 6) float
+        Sum 1.
+    gradients : (n, 6, 3) float
+        Per length; sum 0.
+    """
+    C = np.ascontiguousarray(corners.transpose(2, 1, 0))
+    x = np.ascontiguousarray(points.T)
+    normal = face_normals(C)
+    first = [face[0] for face in TRIANGLES]
+    p = normal / dot(normal, C[:, first] - x[:, None])
+    W, G = np.zeros((6, len(points))), np.zeros((6, 3, len(points)))
+    for corner, (base, *around) in enumerate(_FANS):
+        for j, k in pairwise(around):
+            volume = dot(p[:, base], cross(p[:, j], p[:, k]))
+            W[corner] += volume
+            G[corner] += volume * (p[:, base] + p[:, j] + p[:, k])
+    return normalised(W, G)
+
+
+def normalised(W: Floats, G: Floats) -> tuple[Floats, Floats]:
+    """Return weights (6, n) and their gradients (6, 3, n) as coordinates (n, 6), (n, 6, 3)."""
+    total = W.sum(axis=0)
+    values = W / total
+    slopes = (G - values[:, None] * G.sum(axis=0)) / total
+    return np.ascontiguousarray(values.T), np.ascontiguousarray(slopes.transpose(2, 0, 1))

@@ -75,11 +75,18 @@ class Frame:
 
     def to_work(self, points: Floats) -> Floats:
         """Return world points (n, 3) in the working frame."""
-        return (points - self.origin) @ self.rotation.T / self.scale
+        return np.stack(self.work_columns(points), axis=1)
+
+    def work_columns(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return x, y and z in the working frame, (n,) each, of world points (n, 3).
+
+        A point's numbers are the same, bit for bit, whatever points come with it.
+        """
+        return _turn(points - self.origin, self.rotation / self.scale)
 
     def to_world(self, points: Floats) -> Floats:
         """Return working points (n, 3) in world coordinates."""
-        return (points * self.scale) @ self.rotation + self.origin
+        return np.stack(_turn(points, self.rotation.T * self.scale), axis=1) + self.origin
 
     def snap(self, points_work: Floats) -> Floats:
         """Return working points (n, 3) moved onto the lattice, exactly ``k * steps``.
@@ -111,6 +118,16 @@ class Frame:
             raise OptionError(f"up must be three finite numbers, not all zero, but is {world_up}")
         out: Floats = self.rotation @ (up / length)
         return out
+
+
+def _turn(points: Floats, matrix: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return a matrix times each point (n, 3), by columns, (n,) each.
+
+    Not by the linear algebra library, whose rounding depends on a row's place among the others.
+    """
+    x, y, z = points.T
+    a, b, c = (x * row[0] + y * row[1] + z * row[2] for row in matrix)
+    return a, b, c
 
 
 def working_frame(points: Floats, lattice: Lattice | None, *, exact: bool = True) -> Frame:

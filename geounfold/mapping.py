@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
@@ -17,13 +17,18 @@ from geounfold.distortion import deformation_gradients
 from geounfold.errors import InputError, OptionError
 from geounfold.frame import Frame
 from geounfold.geometry import boundary_faces
+from geounfold.location import Numbers, TetWalk
 from geounfold.mapfile import read_arrays, write_arrays
 from geounfold.mesh import Bools, Floats, Ints, TetMesh
+from geounfold.threads import over_slices, slices
 
 INSIDE, EXTRAPOLATED, OUTSIDE = "inside", "extrapolated", "outside"
 
 REACH = 3.0
 """How far past the control mesh points are carried, in blocks, where nothing else is asked for."""
+
+_SLICE = 1 << 14  # points that a thread carries at once: they stay in its cache
+_MISSED = 1 << 18  # points that libigl places at once
 
 TOUCHING = 1e-9
 """A point this near to a mesh, as a share of the mesh's size, lies in it: rounding."""
@@ -68,6 +73,22 @@ class Carried:
 
 
 @dataclass(frozen=True, eq=False)
+class Returned:
+    """How points came back.
+
+    Attributes
+    ----------
+    largest : float
+        Largest distance between a point and its return, over those that have both; else 0.
+    lost : (n,) bool
+        Points that did not come back though the mesh holds their image: no inverse was found.
+    """
+
+    largest: float
+    lost: Bools
+
+
+@dataclass(frozen=True, eq=False)
 class _Place:
     """Where points lie in one space: see Carried; barycentric coordinates (n, 4)."""
 
@@ -75,6 +96,32 @@ class _Place:
     inside: Bools
     distance: Floats
     weights: Floats
+
+
+class _Image:
+    """Where each tetrahedron's places come to lie: affine in barycentric coordinates."""
+
+    def __init__(self, mesh: TetMesh, stratigraphic: Floats) -> None:
+        values = [*mesh.V.T, stratigraphic]
+        first = [np.ascontiguousarray(v[mesh.T[:, 0]]) for v in values]
+        self._columns = [
+            (a, *(v[mesh.T[:, k]] - a for k in (1, 2, 3)))
+            for v, a in zip(values, first, strict=True)
+        ]
+
+    def __call__(self, element: Ints | Numbers, w1: Floats, w2: Floats, w3: Floats) -> list[Floats]:
+        """Return x, y, z and the stratigraphic coordinate, (k,) each."""
+        out = []
+        for a, b, c, d in self._columns:
+            value = b.take(element)
+            value *= w1
+            for column, w in ((c, w2), (d, w3)):
+                part = column.take(element)
+                part *= w
+                value += part
+            value += a.take(element)
+            out.append(value)
+        return out
 
 
 class _Border:
@@ -108,12 +155,22 @@ class _Space:
     def __init__(
         self, mesh: TetMesh, shell: TetMesh | None, reach: float, known: Sequence[TetIndex]
     ) -> None:
-        self._mesh, self._shell, self._reach = mesh, shell, reach
-        same = [t for t in known if np.array_equal(t.T, mesh.T) and np.array_equal(t.V, mesh.V)]
-        self._index = same[0] if same else TetIndex(mesh.V, mesh.T)
+        self._mesh, self._shell, self._reach, self._known = mesh, shell, reach, known
         self._V = mesh.V if shell is None else shell.V
         self._T = mesh.T if shell is None else np.concatenate([mesh.T, shell.T])
         self._touching = TOUCHING * float(np.ptp(mesh.V, axis=0).max())
+
+    @cached_property
+    def walk(self) -> TetWalk:
+        """What places nearly all points of the control mesh."""
+        return TetWalk(self._mesh.V, self._mesh.T)
+
+    @cached_property
+    def _index(self) -> TetIndex:
+        """What places the others, and says what is right."""
+        V, T = self._mesh.V, self._mesh.T
+        same = [t for t in self._known if np.array_equal(t.T, T) and np.array_equal(t.V, V)]
+        return same[0] if same else TetIndex(V, T)
 
     @cached_property
     def _border(self) -> _Border:
@@ -129,7 +186,7 @@ class _Space:
         return None if self._shell is None else TetIndex(self._shell.V, self._shell.T)
 
     def locate(self, points: Floats) -> _Place:
-        """Return where points (n, 3) lie."""
+        """Return where points (n, 3) lie: the reference, libigl's."""
         element = self._index.locate(points)
         inside = element >= 0
         distance = np.zeros(len(points))
@@ -264,43 +321,109 @@ class UnfoldingMap:
             there: Bools = np.logical_not(np.isnan(P).all(axis=1))
             return _spread(self.carry(P[there], inverse=True), there)
         P = checked_points(P)
-        if not len(P):
-            none = np.empty(0, bool)
-            return Carried(P, np.empty(0), none, none, np.empty(0, np.int64), np.empty(0))
-        scale = self.frame.scale
-        work = P / scale if inverse else self.frame.to_work(P)
-        place = (self._unfolded if inverse else self._folded).locate(work)
-        mesh = self.whole.folded if inverse else self.whole.unfolded
-        corners = mesh.T[np.maximum(place.element, 0)]
-        image = np.einsum("ij,ijk->ik", place.weights, mesh.V[corners])
-        stratigraphic = np.einsum("ij,ij->i", place.weights, self.whole.stratigraphic[corners])
-        placed = place.element >= 0
-        rows, solved = self._by_prisms(work, place, image, stratigraphic, inverse=inverse)
-        placed[rows[~solved]] = False
-        out = self.frame.to_world(image) if inverse else image * scale
-        out[~placed] = np.nan
-        stratigraphic[~placed] = np.nan
-        distance = place.distance * scale
-        unsolved = int((~solved).sum())
-        return Carried(out, stratigraphic, place.inside, placed, place.element, distance, unsolved)
+        n = len(P)
+        space, image = (self._unfolded, self._fold) if inverse else (self._folded, self._unfold)
+        out = Carried(
+            points=np.empty((n, 3)),
+            stratigraphic=np.empty(n),
+            inside=np.empty(n, bool),
+            placed=np.empty(n, bool),
+            element=np.empty(n, np.int64),
+            distance=np.zeros(n),
+        )
+
+        def fill(rows: slice | Ints, place: Ints | Numbers, weights: Sequence[Floats]) -> None:
+            x, y, z, height = image(np.maximum(place, 0), *weights)
+            out.points[rows] = self._from_work(x, y, z, inverse=inverse)
+            out.stratigraphic[rows] = height
+            out.element[rows] = place
+
+        def walk(rows: slice) -> None:
+            place, weights = space.walk.locate(*self._to_work(P[rows], inverse=inverse))
+            fill(rows, place, list(weights))
+            out.inside[rows] = out.placed[rows] = place >= 0
+
+        over_slices(walk, n, _SLICE)
+        missed = np.flatnonzero(~out.inside)
+        for part in slices(len(missed), _MISSED):
+            rows = missed[part]
+            work = np.stack(self._to_work(P[rows], inverse=inverse), axis=1)
+            found = space.locate(work)
+            fill(rows, found.element, list(found.weights.T[1:]))
+            out.inside[rows], out.placed[rows] = found.inside, found.element >= 0
+            out.distance[rows] = found.distance * self.frame.scale
+        empty = missed[~out.placed[missed]]
+        out.points[empty] = np.nan
+        out.stratigraphic[empty] = np.nan
+        if self.prisms is None:
+            return out
+        return replace(out, unsolved=self._by_prisms(self.prisms, P, out, inverse=inverse))
 
     def _by_prisms(
-        self, work: Floats, place: _Place, image: Floats, stratigraphic: Floats, *, inverse: bool
-    ) -> tuple[Ints, Bools]:
-        """Put what prisms carry into image (n, 3) and stratigraphic (n,), working units.
+        self, prisms: PrismInterpolant, points: Floats, carried: Carried, *, inverse: bool
+    ) -> int:
+        """Put what prisms carry in the place of the tetrahedra's answer; count the unsolved."""
+        mesh = self.whole.unfolded if inverse else self.whole.folded
+        placed, unsolved = np.flatnonzero(carried.placed), 0
+        for part in slices(len(placed), _MISSED):
+            rows = placed[part]
+            work = np.stack(self._to_work(points[rows], inverse=inverse), axis=1)
+            element = carried.element[rows]
+            share = barycentric_in_tets(work, mesh.V, mesh.T[element])
+            held = prisms.held(element, share)
+            rows, work, element = rows[held], work[held], element[held]
+            if inverse:
+                start = self.frame.to_work(carried.points[rows])
+                image, height, solved = prisms.back(work, element, start)
+            else:
+                image, height = prisms.carry(work, element)
+                solved = np.ones(len(rows), dtype=bool)
+            carried.points[rows] = self._from_work(*image.T, inverse=inverse)
+            carried.stratigraphic[rows] = height
+            lost = rows[~solved]
+            carried.points[lost], carried.stratigraphic[lost] = np.nan, np.nan
+            carried.placed[lost] = False
+            unsolved += len(lost)
+        return unsolved
 
-        Return the rows they carry, and which of these have an image.
+    def returned(self, points: Floats, carried: Carried) -> Returned:
+        """Return how points come back from where they were carried.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In the data's coordinates.
+        carried : Carried
+            As ``carry`` gave them.
         """
-        if self.prisms is None:
-            return np.empty(0, np.int64), np.empty(0, bool)
-        rows = self.prisms.held(place.element, place.weights)
-        element, solved = place.element[rows], np.ones(len(rows), bool)
-        if inverse:
-            found = self.prisms.back(work[rows], element, image[rows])
-            image[rows], stratigraphic[rows], solved = found
-        else:
-            image[rows], stratigraphic[rows] = self.prisms.carry(work[rows], element)
-        return rows, solved
+        largest, lost = 0.0, np.zeros(len(points), dtype=bool)
+        for rows in slices(len(points), _MISSED):
+            back = self.carry(carried.points[rows], inverse=True)
+            lost[rows] = back.inside & ~back.placed
+            placed = carried.placed[rows] & ~lost[rows]
+            away = np.linalg.norm(back.points[placed] - points[rows][placed], axis=1)
+            largest = max(largest, float(away.max(initial=0.0)))
+        return Returned(largest, lost)
+
+    @cached_property
+    def _unfold(self) -> _Image:
+        return _Image(self.whole.unfolded, self.whole.stratigraphic)
+
+    @cached_property
+    def _fold(self) -> _Image:
+        return _Image(self.whole.folded, self.whole.stratigraphic)
+
+    def _to_work(self, points: Floats, *, inverse: bool) -> tuple[Floats, Floats, Floats]:
+        """Return x, y, z in the working frame of points (k, 3) of either space."""
+        if not inverse:
+            return self.frame.work_columns(points)
+        x, y, z = (np.ascontiguousarray(column) for column in (points / self.frame.scale).T)
+        return x, y, z
+
+    def _from_work(self, x: Floats, y: Floats, z: Floats, *, inverse: bool) -> Floats:
+        """Return points (k, 3) of the other space from their working coordinates."""
+        points = np.stack([x, y, z], axis=1)
+        return self.frame.to_world(points) if inverse else points * self.frame.scale
 
     def gradients(self, points: Floats, element: Ints) -> Floats:
         """Return the deformation gradient at folded points, folded to unfolded.

@@ -33,7 +33,7 @@ from geounfold.geometry import enclosed_volume, triangle_areas
 from geounfold.hull import Hull
 from geounfold.io.results import FOLDED, UNFOLDED, frame_points, result_columns, with_carried
 from geounfold.lattice import Lattice, measure_lattice
-from geounfold.mapping import Carried, UnfoldingMap, checked_points
+from geounfold.mapping import Carried, Returned, UnfoldingMap, checked_points
 from geounfold.mesh import Bools, Floats, Ints, Space, TriMesh, as_trimesh, in_space
 from geounfold.options import UnfoldOptions
 from geounfold.quality import SUSPECT, Quality, assess, torn_blocks
@@ -139,7 +139,7 @@ def unfold(
     with clock.stage("map"):
         mapping = _mapping(fits, frame, chosen)
         carried = mapping.carry(P)
-        back = mapping.carry(carried.points, inverse=True)
+        returned = mapping.returned(P, carried)
     with clock.stage("certificate"):
         certificate = _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
     _check_certified(certificate, chosen)
@@ -151,7 +151,7 @@ def unfold(
             world, whole, carried.element, P, carried.points, chosen.neighbours, gradients
         )
         torn = _torn(groups, given, carried, quality, frame)
-    _check_coordinates(quality, back, P, chosen)
+    _check_coordinates(quality, returned.lost, P, chosen)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
     return Unfolding(
@@ -162,7 +162,7 @@ def unfold(
         fits,
         mapping,
         carried,
-        back,
+        returned,
         quality,
         certificate,
         clock.seconds,
@@ -209,13 +209,8 @@ def _gradients(mapping: UnfoldingMap, folded: Floats, carried: Carried) -> Float
     return mapping.gradients(folded[carried.placed], carried.element[carried.placed])
 
 
-def _lost_inside(carried: Carried) -> Bools:
-    """Return which points have no image though the mesh holds them: no inverse was found."""
-    return carried.inside & ~carried.placed
-
-
 def _check_coordinates(
-    quality: Quality, back: Carried, folded: Floats, options: UnfoldOptions
+    quality: Quality, lost: Bools, folded: Floats, options: UnfoldOptions
 ) -> None:
     """Raise ControlMeshError where a prism's coordinates fold or do not come back.
 
@@ -224,7 +219,6 @@ def _check_coordinates(
     if options.coordinates == "tet" or options.allow_uncertified:
         return
     over = quality.blocks.volume_ratio <= 0
-    lost = _lost_inside(back)
     wrong = over | lost
     if not wrong.any():
         return
@@ -352,7 +346,7 @@ class Unfolding:
         fits: list[BodyFit],
         mapping: UnfoldingMap,
         carried: Carried,
-        back: Carried,
+        returned: Returned,
         quality: Quality,
         certificate: Certificate,
         seconds: dict[str, float],
@@ -370,8 +364,7 @@ class Unfolding:
         self.quality = quality
         self.certificate = certificate
         self.seconds = seconds
-        self._returned = back.points
-        self._unsolved = _lost_inside(back)
+        self._returned = returned
         self._fitted_points = fitted_points
         self._torn = torn
         self._given = None if given is None else given.copy()
@@ -523,10 +516,7 @@ class Unfolding:
     @property
     def round_trip_max(self) -> float:
         """Largest distance between a point and its return, over those that have both."""
-        placed = self.carried.placed & ~self._unsolved
-        if not placed.any():
-            return 0.0
-        return float(np.linalg.norm(self._returned - self.folded, axis=1)[placed].max())
+        return self._returned.largest
 
     def save(self, path: str | Path | BinaryIO) -> None:
         """Write the map (not the points) as .npz; ``geounfold.load`` reads it."""
@@ -585,7 +575,7 @@ class Unfolding:
             **prisms.counts(),
             "blocks_in_prisms": self._in_prisms(prisms),
             "blocks_inside_out": int((self.quality.blocks.volume_ratio <= 0).sum()),
-            "blocks_not_brought_back": int(self._unsolved.sum()),
+            "blocks_not_brought_back": int(self._returned.lost.sum()),
             "tolerance": prisms.tolerance * self.frame.scale,
         }
 
@@ -665,8 +655,8 @@ class Unfolding:
             out.append(f"{self._torn} blocks were torn from their neighbours")
         if not self.injective:
             out.append(f"the map is not proved one-to-one: {', '.join(self._faults)}")
-        if self._unsolved.any():
-            out.append(f"{int(self._unsolved.sum())} points were not brought back by the map")
+        if self._returned.lost.any():
+            out.append(f"{int(self._returned.lost.sum())} points were not brought back by the map")
         return out
 
     def _facts(self) -> Facts:

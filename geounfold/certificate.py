@@ -175,6 +175,8 @@ class Certificate(Mapping[str, Any]):
         Blocks that each of them holds.
     folded, unfolded : (k, 3) float
         Their middles, in the coordinates given.
+    reason : str
+        Why nothing could be checked; empty where something was.
     """
 
     injective: bool
@@ -191,10 +193,35 @@ class Certificate(Mapping[str, Any]):
     blocks: Ints
     folded: Floats
     unfolded: Floats
+    reason: str = ""
+
+    @classmethod
+    def unproved(cls, reason: str) -> Certificate:
+        """Return the certificate of a map of which nothing can be checked, and why not."""
+        none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
+        return cls(
+            injective=False,
+            tetrahedra=0,
+            boundary_faces=0,
+            glued=False,
+            inverted_folded=0,
+            inverted_unfolded=0,
+            crossing_folded=0,
+            crossing_unfolded=0,
+            nested_folded=0,
+            nested_unfolded=0,
+            elements=none,
+            blocks=none,
+            folded=nowhere,
+            unfolded=nowhere,
+            reason=reason,
+        )
 
     @property
     def faults(self) -> list[str]:
         """What is wrong, a phrase for each condition that fails."""
+        if self.reason:
+            return [self.reason]
         phrases = {
             "tetrahedra inverted in the folded space": self.inverted_folded,
             "tetrahedra inverted in the unfolded space": self.inverted_unfolded,
@@ -215,6 +242,7 @@ class Certificate(Mapping[str, Any]):
         }
         return {
             **counts,
+            **({"reason": self.reason} if self.reason else {}),
             "theorem": THEOREM,
             "faulty_elements": len(self.elements),
             "blocks_in_faulty_elements": int(self.blocks.sum()),

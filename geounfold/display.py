@@ -26,8 +26,9 @@ class Facts:
         Relative change of the distances to the neighbours: mean and 95th percentile.
     volume : float
         Volume of the body, unfolded over folded.
-    round_trip : float
-        Largest distance between a point and where the map brings it there and back.
+    round_trip : float or None
+        Largest distance between a point and where the map brings it there and back; None where
+        there is no way back.
     seconds : float
         The run's.
     warnings : sequence of str
@@ -43,7 +44,7 @@ class Facts:
     epsilon: float
     epsilon_p95: float
     volume: float
-    round_trip: float
+    round_trip: float | None
     seconds: float
     warnings: Sequence[str]
 
@@ -78,7 +79,9 @@ class Facts:
             f"{self.outside:,} outside the control mesh",
             "epsilon": f"{self.epsilon:.4f} mean, {self.epsilon_p95:.4f} 95th percentile",
             "volume": f"{self.volume:.4f} of the folded body's",
-            "there and back": f"{self.round_trip:.2g} at most off",
+            "there and back": "no way back"
+            if self.round_trip is None
+            else f"{self.round_trip:.2g} at most off",
             "method": f"{self.method}, {self.seconds:.1f} s",
         }
         cells = "".join(

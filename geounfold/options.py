@@ -14,17 +14,14 @@ from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
 from geounfold.hull import HULLS, HullOptions
 from geounfold.mapping import REACH
+from geounfold.methods import METHODS, IsomapOptions, VerticalOptions, VolumetricOptions
 from geounfold.quality import NEIGHBOURS
 from geounfold.sheet import SheetOptions
 from geounfold.split import SPLITS
 from geounfold.thesis import ThesisOptions
 
-METHODS = ("sheet", "thesis")
-"""Methods for whole bodies: ours, and the thesis's."""
-
-
 VALID: dict[str, tuple[str, ...]] = {
-    "method": METHODS,
+    "method": tuple(METHODS),
     "flattener": tuple(FLATTENERS),
     "hull": ("auto", *HULLS),
     "split": tuple(SPLITS),
@@ -47,7 +44,11 @@ class UnfoldOptions:
     Parameters
     ----------
     method : str
-        ``sheet`` (ours) or ``thesis`` (vertical pairing, flat at mean heights).
+        ``sheet`` (ours); ``thesis`` (vertical pairing, flat at mean heights); ``ufo`` (blocks
+        anchored to one flattened surface along its normals); ``stratigraphic`` (proportional
+        height between bottom and top, x and y kept); ``shear`` (vertical simple shear);
+        ``volumetric`` (tetrahedra of least strain); or ``isomap`` (distances to neighbours).
+        ``stratigraphic``, ``shear`` and ``isomap`` have no control mesh to prove.
     flattener : str
         A name in FLATTENERS.
     hull : str
@@ -72,6 +73,10 @@ class UnfoldOptions:
         Give an answer that is not proved one-to-one, marked, instead of failing.
     hull_options, sheet_options, thesis_options
         The stages' own options.
+    vertical_options : VerticalOptions
+        Of ``stratigraphic`` and ``shear``.
+    volumetric_options, isomap_options
+        The methods' own options.
 
     Raises
     ------
@@ -98,6 +103,9 @@ class UnfoldOptions:
     hull_options: HullOptions = field(default_factory=HullOptions)
     sheet_options: SheetOptions = field(default_factory=SheetOptions)
     thesis_options: ThesisOptions = field(default_factory=ThesisOptions)
+    vertical_options: VerticalOptions = field(default_factory=VerticalOptions)
+    volumetric_options: VolumetricOptions = field(default_factory=VolumetricOptions)
+    isomap_options: IsomapOptions = field(default_factory=IsomapOptions)
 
     def __post_init__(self) -> None:
         for name, valid in VALID.items():

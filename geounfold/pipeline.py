@@ -25,7 +25,7 @@ from geounfold.control import ControlMesh, scaled, side_by_side
 from geounfold.coordinates import PrismInterpolant
 from geounfold.display import Facts
 from geounfold.disturbed import disturbed_lattice
-from geounfold.errors import ControlMeshError, InputError
+from geounfold.errors import ControlMeshError, InputError, OptionError
 from geounfold.fitting import BodyFit, SurfacePair, fit
 from geounfold.flattening import Flattening
 from geounfold.frame import Frame, working_frame
@@ -34,9 +34,10 @@ from geounfold.hull import Hull
 from geounfold.io.results import FOLDED, UNFOLDED, frame_points, result_columns, with_carried
 from geounfold.lattice import Lattice, measure_lattice
 from geounfold.mapping import Carried, Returned, UnfoldingMap, checked_points
-from geounfold.mesh import Bools, Floats, Ints, Space, TriMesh, as_trimesh, in_space
+from geounfold.mesh import Floats, Ints, Space, TriMesh, as_trimesh, in_space
+from geounfold.methods import METHODS, PointwiseMap, no_mesh
 from geounfold.options import UnfoldOptions
-from geounfold.quality import SUSPECT, Quality, assess, torn_blocks
+from geounfold.quality import SUSPECT, Quality, assess, assess_points, torn_blocks
 from geounfold.solid import solid_cells
 
 if TYPE_CHECKING:
@@ -112,6 +113,7 @@ def unfold(
     True
     """
     chosen = replace(options or UnfoldOptions(), **changes)
+    _check_method(chosen)
     clock = _Clock(progress)
     with clock.stage("frame"):
         P = _points(points)
@@ -141,17 +143,13 @@ def unfold(
         carried = mapping.carry(P)
         returned = mapping.returned(P, carried)
     with clock.stage("certificate"):
-        certificate = _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
+        certificate = _certificate(mapping, carried, frame)
     _check_certified(certificate, chosen)
     _check_placed(groups, P, carried, chosen)
     with clock.stage("quality"):
-        world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
-        gradients = _gradients(mapping, P, carried)
-        quality = assess(
-            world, whole, carried.element, P, carried.points, chosen.neighbours, gradients
-        )
+        quality = _quality(mapping, carried, P, frame, chosen.neighbours)
         torn = _torn(groups, given, carried, quality, frame)
-    _check_coordinates(quality, returned.lost, P, chosen)
+    _check_coordinates(quality, returned, P, chosen)
     _check_torn(torn, P, chosen)
     fitted = sum(len(group) for group in groups)
     return Unfolding(
@@ -169,6 +167,22 @@ def unfold(
         fitted,
         len(torn),
         points if isinstance(points, pd.DataFrame) else None,
+    )
+
+
+def _check_method(options: UnfoldOptions) -> None:
+    """Raise OptionError where the method proves nothing, unless that is allowed."""
+    if METHODS[options.method].control:
+        return
+    if options.coordinates != "tet":
+        raise OptionError(
+            no_mesh(options.method, f"--coordinates {options.coordinates} has no prisms to go by")
+        )
+    if options.allow_uncertified:
+        return
+    raise OptionError(
+        no_mesh(options.method, "nothing is proved of its map")
+        + ", or --allow-uncertified to write the answer all the same"
     )
 
 
@@ -210,14 +224,15 @@ def _gradients(mapping: UnfoldingMap, folded: Floats, carried: Carried) -> Float
 
 
 def _check_coordinates(
-    quality: Quality, lost: Bools, folded: Floats, options: UnfoldOptions
+    quality: Quality, returned: Returned | None, folded: Floats, options: UnfoldOptions
 ) -> None:
     """Raise ControlMeshError where a prism's coordinates fold or do not come back.
 
     Unless that is allowed.  That they do neither at any block is no proof.
     """
-    if options.coordinates == "tet" or options.allow_uncertified:
+    if options.coordinates == "tet" or options.allow_uncertified or returned is None:
         return
+    lost = returned.lost
     over = quality.blocks.volume_ratio <= 0
     wrong = over | lost
     if not wrong.any():
@@ -280,18 +295,47 @@ def _reference(
     )
 
 
-_THESIS_REACH = 10.0  # blocks: the thesis's mesh leaves many outside, and has no shell
-
-
-def _mapping(fits: list[BodyFit], frame: Frame, options: UnfoldOptions) -> UnfoldingMap:
+def _mapping(
+    fits: list[BodyFit], frame: Frame, options: UnfoldOptions
+) -> UnfoldingMap | PointwiseMap:
     """Return the map of all bodies, without shells where those are in each other's way."""
-    reach = options.reach if options.method == "sheet" else _THESIS_REACH
-    control, shell = side_by_side([(f.control, f.shell) for f in fits])
+    rules = [(f.rule, f.points) for f in fits if f.rule is not None and f.points is not None]
+    if rules:
+        if len(fits) > 1:
+            raise OptionError(
+                no_mesh(options.method, "it unfolds one body at a time")
+                + ", or choose one by --body"
+            )
+        return PointwiseMap(options.method, frame, *rules[0], options.reach)
+    reach = METHODS[options.method].reach
+    meshes = [(f.control, f.shell) for f in fits if f.control is not None]
+    control, shell = side_by_side(meshes)
     if len(fits) > 1 and shell is not None:
         none = np.empty(0, np.int64)
         if not certify(control, shell, none).injective:
-            control, shell = side_by_side([(f.control, None) for f in fits])
+            control, shell = side_by_side([(control, None) for control, _ in meshes])
+    reach = options.reach if reach is None else reach
     return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates)
+
+
+def _certificate(
+    mapping: UnfoldingMap | PointwiseMap, carried: Carried, frame: Frame
+) -> Certificate:
+    """Return what is proved of a map, places in the data's coordinates and unit."""
+    if isinstance(mapping, PointwiseMap):
+        return Certificate.unproved(mapping.fault)
+    return _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
+
+
+def _quality(
+    mapping: UnfoldingMap | PointwiseMap, carried: Carried, P: Floats, frame: Frame, k: int
+) -> Quality:
+    """Return how good the answer is: by the control mesh, or by each block's neighbours."""
+    if isinstance(mapping, PointwiseMap):
+        return assess_points(P, carried.points, frame.scale**3, k)
+    world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
+    gradients = _gradients(mapping, P, carried)
+    return assess(world, whole, carried.element, P, carried.points, k, gradients)
 
 
 def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
@@ -327,8 +371,9 @@ class Unfolding:
         The block lattice, None for scattered points.
     fits : list of BodyFit
         Every stage, in working units, one per body.
-    map : UnfoldingMap
-        Carries any points both ways.
+    map : UnfoldingMap or PointwiseMap
+        Carries any points both ways; the latter, of methods without a control mesh, can neither
+        be saved nor proved.
     quality : Quality
         Figures for the whole and per block.
     certificate : Certificate
@@ -344,9 +389,9 @@ class Unfolding:
         frame: Frame,
         lattice: Lattice | None,
         fits: list[BodyFit],
-        mapping: UnfoldingMap,
+        mapping: UnfoldingMap | PointwiseMap,
         carried: Carried,
-        returned: Returned,
+        returned: Returned | None,
         quality: Quality,
         certificate: Certificate,
         seconds: dict[str, float],
@@ -505,7 +550,15 @@ class Unfolding:
 
     @cached_property
     def control(self) -> ControlMesh:
-        """The control mesh in the data's coordinates and unit."""
+        """The control mesh in the data's coordinates and unit.
+
+        Raises
+        ------
+        OptionError
+            The method has none.
+        """
+        if isinstance(self.map, PointwiseMap):
+            raise OptionError(no_mesh(self.options.method, "there is none to return"))
         return _in_world(self.map.control, self.frame)
 
     @property
@@ -514,12 +567,26 @@ class Unfolding:
         return float(np.mean(~self.carried.inside))
 
     @property
-    def round_trip_max(self) -> float:
-        """Largest distance between a point and its return, over those that have both."""
-        return self._returned.largest
+    def round_trip_max(self) -> float | None:
+        """Largest distance between a point and its return, over those that have both.
+
+        None where the method has no way back.
+        """
+        return None if self._returned is None else self._returned.largest
+
+    @property
+    def _lost(self) -> int:
+        """How many points were not brought back though the map holds their image."""
+        return 0 if self._returned is None else int(self._returned.lost.sum())
 
     def save(self, path: str | Path | BinaryIO) -> None:
-        """Write the map (not the points) as .npz; ``geounfold.load`` reads it."""
+        """Write the map (not the points) as .npz; ``geounfold.load`` reads it.
+
+        Raises
+        ------
+        OptionError
+            The method has no control mesh.
+        """
         self.map.save(path)
 
     def summary(self) -> dict[str, Any]:
@@ -575,7 +642,7 @@ class Unfolding:
             **prisms.counts(),
             "blocks_in_prisms": self._in_prisms(prisms),
             "blocks_inside_out": int((self.quality.blocks.volume_ratio <= 0).sum()),
-            "blocks_not_brought_back": int(self._returned.lost.sum()),
+            "blocks_not_brought_back": self._lost,
             "tolerance": prisms.tolerance * self.frame.scale,
         }
 
@@ -620,7 +687,9 @@ class Unfolding:
         after = triangle_areas(pair.unfolded.V, pair.unfolded.F).sum()
         return {"faces": len(pair.folded.F), "area": float(before), "area_unfolded": float(after)}
 
-    def _control_summary(self) -> dict[str, Any]:
+    def _control_summary(self) -> dict[str, Any] | None:
+        if isinstance(self.map, PointwiseMap):
+            return None
         control = self.map.control
         return {
             "vertices": len(control.folded.V),
@@ -653,10 +722,11 @@ class Unfolding:
             )
         if self._torn:
             out.append(f"{self._torn} blocks were torn from their neighbours")
+        out += [warning for fit in self.fits for warning in fit.warnings]
         if not self.injective:
             out.append(f"the map is not proved one-to-one: {', '.join(self._faults)}")
-        if self._returned.lost.any():
-            out.append(f"{int(self._returned.lost.sum())} points were not brought back by the map")
+        if self._lost:
+            out.append(f"{self._lost} points were not brought back by the map")
         return out
 
     def _facts(self) -> Facts:

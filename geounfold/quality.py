@@ -28,6 +28,8 @@ NEIGHBOURS = 26
 _CHUNK = 1 << 16  # points whose neighbours are sought at once: 28 MB beside the answer
 _CACHED = 1 << 11  # points whose distances are summed at once: they stay in the cache
 _PAIRS = 100_000  # pairs that the far distances are sampled with
+_SIDES = 6  # neighbours that share a face with a block of a lattice
+_PLANE = 1e-9  # of the largest variance: less than this across a plane is none
 _ALONG = 0.95  # cosine from which a pair of neighbours counts as lying along an axis (18 degrees)
 
 
@@ -557,7 +559,8 @@ class Quality:
     volume_folded, volume_unfolded : float
         Signed volume of the control mesh in both spaces.
     inverted_folded, inverted_unfolded : int
-        Tetrahedra whose volume is not positive.
+        Tetrahedra whose volume is not positive; for a map without a control mesh, blocks whose
+        neighbours' images are turned inside out.
     """
 
     blocks: BlockQuality
@@ -611,3 +614,91 @@ def assess(
         inverted_folded=int(np.count_nonzero(before <= 0)),
         inverted_unfolded=int(np.count_nonzero(after <= 0)),
     )
+
+
+def assess_points(folded: Floats, unfolded: Floats, volume: float, k: int = NEIGHBOURS) -> Quality:
+    """Return the quality of an unfolding without a control mesh, by each block's neighbours.
+
+    The deformation gradient at a block is the linear map that takes the offsets of its k
+    neighbours nearest to their images, in the least squares.
+
+    Parameters
+    ----------
+    folded, unfolded : (n, 3) float
+        The blocks in both spaces, in the same unit; those without an image are NaN when unfolded,
+        have NaN figures and are no other block's neighbours.
+    volume : float
+        Of one block.
+    k : int
+        Number of neighbours.
+
+    Raises
+    ------
+    InputError
+        Too few points with an image.
+    ControlMeshError
+        Neighbours that lie in one plane across the layers when unfolded.
+    """
+    placed = np.isfinite(unfolded).all(axis=1)
+    X, Y = folded[placed], unfolded[placed]
+    ids = neighbours(X, k)
+    d = distortion(neighbour_gradients(X, Y, ids))
+    pairs = np.stack([np.repeat(np.arange(len(X)), _SIDES), ids[:, :_SIDES].ravel()], axis=1)
+
+    def spread(values: Floats) -> Floats:
+        out = np.full(len(folded), np.nan)
+        out[placed] = values
+        return out
+
+    changed = epsilon(X, Y, k)
+    return Quality(
+        blocks=BlockQuality(
+            volume_ratio=spread(d.volume_ratio),
+            nmd_error=spread(changed),
+            stretch_min=spread(d.stretch_min),
+            stretch_max=spread(d.stretch_max),
+            shear=spread(d.shear),
+        ),
+        nmd=Statistics.of(changed),
+        shear=Statistics.of(d.shear),
+        volume_change=Statistics.of(np.abs(d.volume_ratio - 1)),
+        edge_change=Statistics.of(np.abs(distance_ratios(X, Y, pairs) - 1)),
+        volume_folded=volume * len(X),
+        volume_unfolded=float(volume * d.volume_ratio.sum()),
+        inverted_folded=0,
+        inverted_unfolded=int(np.count_nonzero(d.volume_ratio <= 0)),
+    )
+
+
+def neighbour_gradients(X: Floats, Y: Floats, ids: Ints) -> Floats:
+    """Return the linear map (n, 3, 3) of each point's neighbourhood, in the least squares.
+
+    Where the neighbours lie in a plane, the plane's normal is taken to its image's unit normal.
+
+    Parameters
+    ----------
+    X, Y : (n, 3) float
+        Points in both spaces.
+    ids : (n, k) int
+        Each point's neighbours.
+    """
+    C, D = np.empty((len(X), 3, 3)), np.empty((len(X), 3, 3))
+    for start in range(0, len(X), _CACHED):
+        rows = slice(start, start + _CACHED)
+        a, b = X[ids[rows]] - X[rows, None], Y[ids[rows]] - Y[rows, None]
+        C[rows] = np.einsum("nki,nkj->nij", a, a)
+        D[rows] = np.einsum("nki,nkj->nij", b, a)
+    value, axes = np.linalg.eigh(C)
+    flat = value[:, 0] < _PLANE * value[:, 2]
+    inverse = np.where(flat, 0.0, 1 / np.where(flat, 1.0, value[:, 0]))
+    weights = np.column_stack([inverse, 1 / value[:, 1:]])
+    J: Floats = D @ np.einsum("nik,nk,njk->nij", axes, weights, axes)
+    if flat.any():
+        e, part = axes[flat], J[flat]
+        normal = np.cross(e[:, :, 1], e[:, :, 2])
+        image = np.cross(
+            np.einsum("nij,nj->ni", part, e[:, :, 1]), np.einsum("nij,nj->ni", part, e[:, :, 2])
+        )
+        image /= np.linalg.norm(image, axis=1, keepdims=True)
+        J[flat] = part + image[:, :, None] * normal[:, None, :]
+    return J

@@ -278,6 +278,8 @@ def _reasons(summary: Mapping[str, Any]) -> Iterable[str]:
                 f"Not proved: inside the prisms points go by {used} coordinates of their corners, "
                 "not by the tetrahedra's; the blocks were there and back, and none inside out."
             )
+    elif certificate.get("reason"):
+        yield f"Not proved: {certificate['reason']}."
     elif certificate:
         yield (
             f"Not proved: {_number(certificate['crossing_folded'])} pairs of border faces cross in "

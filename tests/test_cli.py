@@ -48,6 +48,12 @@ class FakeMap:
         )
 
 
+class Given(dict[str, Any]):
+    """Options as they were given, of the default method."""
+
+    method = "sheet"
+
+
 class FakeUnfolding(FakeMap):
     """What the pipeline returns, as far as the command line looks at it."""
 
@@ -77,7 +83,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         return FakeUnfolding(points, ("8 blocks lie outside",))
 
     _replace(monkeypatch, "pipeline", unfold=unfold)
-    _replace(monkeypatch, "options", UnfoldOptions=lambda **given: given)
+    _replace(monkeypatch, "options", UnfoldOptions=Given)
     _replace(monkeypatch, "mapping", load=lambda _: FakeMap())
     return made
 

@@ -9,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import geounfold as gu
-from geounfold import fitting, pipeline
+from geounfold import pipeline
 from geounfold.errors import ControlMeshError, InputError, OptionError
 from geounfold.geometry import tet_volumes
+from geounfold.methods import METHODS
 from geounfold.sheet import ControlOptions, SheetOptions
 from geounfold.synthetic import simulate
 
@@ -190,16 +191,16 @@ def test_reference_surfaces_in_place_of_a_hull():
 
 
 def test_inverted_tetrahedra_are_an_error_unless_allowed(swelling, monkeypatch):
-    sound = fitting._fit_sheet
+    sound = METHODS["sheet"]
 
     def spoiled(*args):
-        result = sound(*args)
+        result = sound.fit(*args)
         V = np.array(result.control.unfolded.V)
         V[:, 2] *= -1
         unfolded = result.control.unfolded.with_vertices(V)
         return replace(result, control=replace(result.control, unfolded=unfolded), shell=None)
 
-    monkeypatch.setattr(fitting, "_fit_sheet", spoiled)
+    monkeypatch.setitem(METHODS, "sheet", replace(sound, fit=spoiled))
     with pytest.raises(ControlMeshError, match=r"inverted in the unfolded space.* around"):
         gu.unfold(swelling)
     u = gu.unfold(swelling, allow_uncertified=True)

@@ -125,3 +125,57 @@ def _finite(uv: Any, n: int, name: str) -> Floats:
         msg = f"libigl's {name} returned positions that are not finite"
         raise BackendError(msg)
     return out
+
+
+class SlimTets:
+    """SLIM on tetrahedra: steps of the symmetric Dirichlet energy that invert none.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices at rest.
+    T : (m, 4) int
+        Tetrahedra.
+    """
+
+    def __init__(self, V: Floats, T: Ints) -> None:
+        self._T = np.asfortranarray(T, dtype=np.int32)
+        edges = V[T[:, 1:]] - V[T[:, :1]]
+        self._unit = float(np.cbrt(np.linalg.det(edges).sum() / 6))
+        self._V = np.asfortranarray((V - V.mean(axis=0)) / self._unit, dtype=np.float64)
+
+    def __call__(self, V: Floats, held: Ints, wanted: Floats, weight: float) -> Floats:
+        """Return the places after one step from V (n, 3), (n, 3).
+
+        Parameters
+        ----------
+        V : (n, 3) float
+            Where to start: no tetrahedron inverted.
+        held : (k,) int
+            Vertices that are drawn somewhere.
+        wanted : (k, 3) float
+            Where to.
+        weight : float
+            Of their mean square distance from there against the mean energy.
+
+        Raises
+        ------
+        BackendError
+            libigl refused, or returned something that is not finite.
+        """
+        data = _guarded(
+            "slim_precompute",
+            igl.slim_precompute,
+            self._V,
+            self._T,
+            np.asfortranarray(V / self._unit, dtype=np.float64),
+            igl.MappingEnergyType.SYMMETRIC_DIRICHLET,
+            np.ascontiguousarray(held, dtype=np.int32),
+            np.asfortranarray(wanted / self._unit, dtype=np.float64),
+            weight * self._unit**2 / len(held),
+        )
+        after = np.array(_guarded("slim_solve", igl.slim_solve, data, 1), order="C")
+        if after.shape != self._V.shape or not np.isfinite(after).all():
+            msg = "libigl's slim_solve returned positions that are not finite"
+            raise BackendError(msg)
+        return after * self._unit

@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_tabl
 if TYPE_CHECKING:
     from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Bools, Floats, TriMesh
+    from geounfold.methods import PointwiseMap
     from geounfold.options import UnfoldOptions
 
 _POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
@@ -72,6 +73,8 @@ def unfold(args: Namespace, console: Console) -> None:
     )
     if args.report is not None:
         _check_pictures(console)
+    options = _options(args)
+    _check_mesh_outputs(args, options)
     table = _read(args.points, args, console)
     table.check_writable(args.output)
     samples = _read_samples(args, console)
@@ -82,7 +85,7 @@ def unfold(args: Namespace, console: Console) -> None:
     }
     from geounfold import pipeline
 
-    result = pipeline.unfold(table.points, _options(args), progress=console.stage, **surfaces)
+    result = pipeline.unfold(table.points, options, progress=console.stage, **surfaces)
     summary = {**result.summary(), "input": table.facts(), "command": _command(args)}
     warnings = summary.get("warnings", [])
     if samples is not None:
@@ -107,7 +110,8 @@ def unfold(args: Namespace, console: Console) -> None:
         if "--mesh" in parts:
             from geounfold.io.volumes import write_control
 
-            write_control(parts["--mesh"], result.map, result.certificate)
+            mapped = cast("UnfoldingMap", result.map)  # the method has a control mesh: checked
+            write_control(parts["--mesh"], mapped, result.certificate)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
         if "--report" in parts:
@@ -125,6 +129,16 @@ def unfold(args: Namespace, console: Console) -> None:
         _warn_of_outside(f"the holes' {name}", columns, console)
     console.done(f"{len(table)} points unfolded into {args.output}")
     console.answer(summary)
+
+
+def _check_mesh_outputs(args: Namespace, options: UnfoldOptions) -> None:
+    """Raise OptionError where a control mesh is to be written that the method has none of."""
+    from geounfold.methods import METHODS, no_mesh
+
+    if not METHODS[options.method].control:
+        for path, name in ((args.map, "--map"), (args.mesh, "--mesh")):
+            if path is not None:
+                raise OptionError(no_mesh(options.method, f"{name} has nothing to write"))
 
 
 def carry(args: Namespace, console: Console) -> None:
@@ -218,7 +232,7 @@ def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
     console.answer({"vertices": _places(result_columns(UNFOLDED, carried))})
 
 
-def _flat(saved: UnfoldingMap) -> Callable[[Floats], dict[str, Any]]:
+def _flat(saved: UnfoldingMap | PointwiseMap) -> Callable[[Floats], dict[str, Any]]:
     """Return what carries points to the flat side, into output columns."""
     return lambda points: result_columns(UNFOLDED, saved.carry(points))
 

@@ -224,7 +224,11 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
         **given,
     )
     group.add_argument(
-        "--method", metavar="M", help="sheet (default) or thesis: how the map is made", **given
+        "--method",
+        metavar="M",
+        help="sheet (default), thesis, ufo, stratigraphic, shear, volumetric or isomap: how the "
+        "map is made",
+        **given,
     )
     group.add_argument(
         "--flattener", metavar="F", help="spring (default) or another: `compare` shows all", **given

@@ -1,0 +1,290 @@
+"""What every method of whole bodies is given, and what it returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from geounfold.control import ControlMesh
+from geounfold.flattening import Flattening, flatten
+from geounfold.frame import Frame
+from geounfold.geometry import face_normals, triangle_areas
+from geounfold.hull import Hull
+from geounfold.mesh import Bools, Floats, Space, TriMesh, in_space
+from geounfold.sheet import SheetOptions, SheetResult
+from geounfold.split import SurfaceSplit
+
+if TYPE_CHECKING:
+    import pyvista
+
+Stage = Callable[[str], AbstractContextManager[None]]
+"""``with stage("hull"):`` times a stage and shows its name."""
+
+OTHER_SIDE = {"top": "bottom", "bottom": "top"}
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What a method is given of one body, in working units.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        What the body is fitted to: its blocks moved onto their lattice, gaps filled.
+    blocks : (b, 3) float
+        Its blocks as they were given.
+    frame : Frame
+        Working frame.
+    hull : Hull or None
+        None where reference surfaces were given.
+    split : SurfaceSplit
+        The hull's (or the reference surfaces') faces as top, bottom and rim.
+    up : (3,) float
+        World direction that the top is to look to, as a unit vector.
+    datum : str
+        Which surface is to be flat; sides as in ``split``.
+    flattener : str
+        A name in FLATTENERS.
+    reach : float
+        How far past the body points are to be carried, in blocks.
+    options : Any
+        The method's own options.
+    sheet_options : SheetOptions
+        How reference surfaces are fitted.
+    stage : callable
+        See Stage.
+    """
+
+    points: Floats
+    blocks: Floats
+    frame: Frame
+    hull: Hull | None
+    split: SurfaceSplit
+    up: Floats
+    datum: str
+    flattener: str
+    reach: float
+    options: Any
+    sheet_options: SheetOptions
+    stage: Stage
+
+    def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
+        """Lay a surface flat by the chosen flattener, as the answer comes."""
+        return flatten(mesh, self.flattener, start=start, repair=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points that a method placed in the flat space.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Their images, working units; NaN where there is none.
+    stratigraphic : (n,) float
+        0 at the bottom surface, 1 at the top; NaN where there is no image.
+    anchored : (n,) bool
+        Whether the surfaces hold the point; else they were continued past their border.
+    """
+
+    points: Floats
+    stratigraphic: Floats
+    anchored: Bools
+
+
+class Pointwise(Protocol):
+    """A map without a control mesh: a rule for single points, working units."""
+
+    @property
+    def way_back(self) -> bool:
+        """Whether there is a rule for the way back."""
+
+    def to_flat(self, points: Floats) -> Placed:
+        """Place folded points (n, 3) in the flat space."""
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Return flat points (n, 3) in the folded space, NaN where there is no place."""
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedOver:
+    """A pointwise map with top and bottom exchanged: the flat space turned about its x axis."""
+
+    rule: Pointwise
+
+    @property
+    def way_back(self) -> bool:
+        """As the rule's."""
+        return self.rule.way_back
+
+    def to_flat(self, points: Floats) -> Placed:
+        """Place folded points as the rule does, then turn them over."""
+        placed = self.rule.to_flat(points)
+        return Placed(turned(placed.points), 1 - placed.stratigraphic, placed.anchored)
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Turn flat points back over, then carry them as the rule does."""
+        return self.rule.to_folded(turned(points))
+
+
+def turned(V: Floats) -> Floats:
+    """Return flat points (n, 3) turned about the x axis by half a turn: never mirrored."""
+    out: Floats = V * np.array([1.0, -1.0, -1.0])
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePair:
+    """A reference surface in both spaces, and how it was flattened.
+
+    ``flattening`` is None for a surface that the method's map carried, not flattened itself.
+    """
+
+    folded: TriMesh
+    unfolded: TriMesh
+    flattening: Flattening | None
+
+    def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
+        """Return the surface in one space for pyvista.
+
+        The point data of the other space's name, (n, 3), holds where each vertex lies there.
+        """
+        here, there, other = in_space(space, self.folded, self.unfolded)
+        surface = here.to_pyvista()
+        surface.point_data[other] = there.to_pyvista().points
+        return surface
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFit:
+    """Everything made of one body, working units.
+
+    One of ``control`` and ``rule`` is there: a control mesh, which can be certified, or a rule
+    for single points, of which nothing is proved.
+
+    Attributes
+    ----------
+    hull : Hull or None
+        None where reference surfaces were given.
+    split : SurfaceSplit
+        The hull's faces as top, bottom and rim.
+    control : ControlMesh or None
+        Tetrahedra in both spaces; unfolded z up is the top side.
+    shell : ControlMesh or None
+        Tetrahedra around them, for points outside; over the control mesh's vertices and others.
+    surfaces : dict of SurfacePair
+        ``top``, ``bottom`` and, for all methods but the thesis's, ``mid``.
+    flattenings : dict of Flattening
+        Every surface that was flattened.
+    sheet : SheetResult or None
+        The sheet method's stages, where they were gone through.
+    notes : dict
+        Figures of the method for the summary.
+    rule : Pointwise or None
+        The map of a method without a control mesh.
+    points : (n, 3) float or None
+        The body's blocks, which such a map is good for.
+    warnings : tuple of str
+        What the method could not do for this body, one sentence each.
+    """
+
+    hull: Hull | None
+    split: SurfaceSplit
+    control: ControlMesh | None
+    shell: ControlMesh | None
+    surfaces: dict[str, SurfacePair]
+    flattenings: dict[str, Flattening]
+    sheet: SheetResult | None
+    notes: dict[str, object]
+    rule: Pointwise | None = None
+    points: Floats | None = None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of the table.
+
+    Attributes
+    ----------
+    name : str
+        Its name in METHODS.
+    fit : callable
+        ``fit(body) -> BodyFit``.
+    options : str
+        The field of the unfolding's options that holds its own.
+    control : bool
+        Whether its map is a control mesh: can be certified, saved and drawn.
+    reach : float or None
+        How far past the control mesh points are carried, in blocks, where that is not asked of
+        the user: methods whose mesh leaves blocks outside and has no shell.
+    hull : str
+        What the hull ``auto`` stands for.
+    surfaces : bool
+        Whether it takes reference surfaces in place of a hull.
+    """
+
+    name: str
+    fit: Callable[[Body], BodyFit]
+    options: str
+    control: bool = True
+    reach: float | None = None
+    hull: str = "auto"
+    surfaces: bool = True
+
+
+def mean_top_normal(parts: SurfaceSplit) -> Floats:
+    """Return the area-weighted sum of the top's normals, (3,), working units."""
+    F = parts.mesh.F[parts.side > 0]
+    area = triangle_areas(parts.mesh.V, F)
+    out: Floats = (area[:, None] * face_normals(parts.mesh.V, F)).sum(axis=0)
+    return out
+
+
+def level(mesh: TriMesh, uv: Floats, z: float) -> TriMesh:
+    """Return a mesh laid flat at a height."""
+    return mesh.with_vertices(np.column_stack([uv, np.full(len(uv), z)]))
+
+
+def _over_control(control: ControlMesh) -> ControlMesh:
+    return ControlMesh(
+        control.folded,
+        control.unfolded.with_vertices(turned(control.unfolded.V)),
+        1 - control.stratigraphic,
+    )
+
+
+def turned_over(fit: BodyFit) -> BodyFit:
+    """Return the fit with top and bottom exchanged: the flat space turned about its x axis."""
+    notes = dict(fit.notes)
+    if "layers_follow" in notes:
+        notes["layers_follow"] = OTHER_SIDE.get(str(notes["layers_follow"]), "mid")
+    parts = fit.split
+    return replace(
+        fit,
+        split=replace(parts, side=-parts.side, flipped_up=not parts.flipped_up),
+        control=None if fit.control is None else _over_control(fit.control),
+        shell=None if fit.shell is None else _over_control(fit.shell),
+        surfaces={
+            OTHER_SIDE.get(name, name): replace(
+                pair, unfolded=pair.unfolded.with_vertices(turned(pair.unfolded.V))
+            )
+            for name, pair in fit.surfaces.items()
+        },
+        flattenings={OTHER_SIDE.get(name, name): f for name, f in fit.flattenings.items()},
+        notes=notes,
+        rule=None if fit.rule is None else TurnedOver(fit.rule),
+    )
+
+
+def carried_pair(folded: TriMesh, rule: Pointwise) -> SurfacePair:
+    """Return a surface as a pointwise map carries it, without faces that have no image."""
+    flat = rule.to_flat(folded.V).points
+    there: Bools = np.asarray(np.isfinite(flat).all(axis=1))
+    whole: Bools = np.asarray(there[folded.F].all(axis=1))
+    part, old = folded.submesh(whole)
+    return SurfacePair(part, part.with_vertices(flat[old]), None)

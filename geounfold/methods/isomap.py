@@ -1,0 +1,342 @@
+"""Landmark Isomap of the mid surface, then each block by its distances, as Unfolding.jl does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import eigh
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import cKDTree
+
+from geounfold.errors import FlatteningError, InputError, OptionError
+from geounfold.geometry import vertex_normals
+from geounfold.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.methods.contract import Body, BodyFit, Placed, carried_pair
+from geounfold.methods.sheet import sheet_stages
+from geounfold.sheet import SheetResult
+from geounfold.sheet.build import register
+
+_TIE = 1e-6  # of a distance: neighbours this equally far are all taken or all left
+_SPARE = 24  # neighbours asked for beyond those wanted, for ties
+_CHUNK = 4096  # points placed at once
+_STEPS = 60  # of Levenberg and Marquardt, most
+_STILL = 1e-10  # blocks: a point that moves less has arrived
+_TINY = 1e-12  # blocks: points this near have no direction to each other
+_OWN = 1e-9  # blocks: a point this near to a block is the block
+_HASH = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IsomapOptions:
+    """Options of ``isomap``; the numbers are Unfolding.jl's.
+
+    Parameters
+    ----------
+    neighbours : int
+        Of each point of the mid surface in the graph.
+    landmarks : int
+        Points of the mid surface whose distances to all others are measured; fewer where the
+        surface has fewer.
+    near : int
+        Placed points that a block keeps its distances to.
+    rounds : int
+        Blocks are placed in so many rounds, each by the blocks of those before it.
+    largest : float
+        A block whose distance to one of its neighbours is off by more than this, in blocks, is
+        placed again in the next round and places no others.
+    """
+
+    neighbours: int = 16
+    landmarks: int = 1500
+    near: int = 50
+    rounds: int = 4
+    largest: float = 2.5
+
+    def __post_init__(self) -> None:
+        for name, least in (("neighbours", 3), ("landmarks", 4), ("near", 4), ("rounds", 1)):
+            if getattr(self, name) < least:
+                raise OptionError(
+                    f"isomap: {name} must be at least {least}, but is {getattr(self, name)}"
+                )
+        if not (np.isfinite(self.largest) and self.largest > 0):
+            raise OptionError(f"isomap: largest must be positive, but is {self.largest}")
+
+
+def fit_isomap(body: Body) -> BodyFit:
+    """Return the map of a body by landmark Isomap (Caixeta and Costa 2021).
+
+    Points of the mid surface are joined with their nearest neighbours; the shortest paths along
+    the graph stand for lengths along the surface, and classical scaling of the paths between the
+    landmarks (de Silva and Tenenbaum 2004) lays the surface flat.  A block starts over the
+    nearest point of the surface, as high as it is far from it, and then moves to where its
+    distances to the nearest placed points are, in the least squares, those of the folded body.
+
+    What differs from Unfolding.jl: the mid surface is the one that ``sheet`` fits, not thinned
+    sections; landmarks are the farthest from each other, not drawn; the least squares are solved
+    by Levenberg and Marquardt, not Nelder and Mead; rounds are drawn by place, so that neither
+    the rows' order nor chance matter.
+
+    Notes
+    -----
+    A path along a graph is longer than the line it follows, so the surface comes out too large;
+    layers do not slip; the map is known at the blocks alone, and has no inverse.
+
+    Raises
+    ------
+    FlatteningError
+        The graph falls apart, or has no two dimensions.
+    """
+    options: IsomapOptions = body.options
+    sheet = sheet_stages(body, "mid", 0.0)
+    mesh = sheet.mesh
+    with body.stage("isomap"):
+        mid = TriMesh(mesh.layers.P, mesh.layers.F)
+        uv, count = landmark_isomap(mid.V, options)
+        uv = _onto(uv, mid, mesh.layers.flat)
+        placed = _placed(body.points, mid, uv, options)
+        rule = NeighbourRule(np.concatenate([mid.V, body.points]), placed, options, sheet)
+        surfaces = {name: carried_pair(pair[0], rule) for name, pair in sheet.mesh.surfaces.items()}
+    notes: dict[str, object] = {"reference": len(mid.V), "landmarks": count}
+    return BodyFit(
+        body.hull,
+        body.split,
+        None,
+        None,
+        surfaces,
+        {},
+        sheet,
+        notes,
+        rule,
+        body.blocks,
+    )
+
+
+def landmark_isomap(P: Floats, options: IsomapOptions) -> tuple[Floats, int]:
+    """Return points of a surface (n, 3) laid flat (n, 2), and the number of landmarks.
+
+    Raises
+    ------
+    FlatteningError
+        The graph of neighbours falls apart, or its distances have no two dimensions.
+    """
+    graph = _graph(P, options.neighbours)
+    parts = int(connected_components(graph, directed=False)[0])
+    if parts > 1:
+        raise FlatteningError(
+            f"isomap: the graph of neighbours falls into {parts} parts; raise neighbours above "
+            f"{options.neighbours}"
+        )
+    marks = _farthest(P, min(options.landmarks, len(P)))
+    far = np.asarray(dijkstra(graph, directed=False, indices=marks)) ** 2
+    among = far[:, marks]
+    mean = among.mean(axis=0)
+    gram = -0.5 * (among - mean - mean[:, None] + mean.mean())
+    n = len(marks)
+    value, vector = eigh((gram + gram.T) / 2, subset_by_index=(n - 2, n - 1))
+    value, vector = value[::-1], vector[:, ::-1]
+    if not value[1] > 0:
+        raise FlatteningError("isomap: the distances along the surface have no two dimensions")
+    # Each point by its distances to the landmarks; the landmarks come to their own places.
+    return -0.5 * (far - mean[:, None]).T @ (vector / np.sqrt(value)), n
+
+
+def _graph(P: Floats, k: int) -> sp.csr_array:
+    """Return the lengths of the edges between points and their k nearest, ties included."""
+    count = min(k + 1 + _SPARE, len(P))
+    distance, near = (np.asarray(a)[:, 1:] for a in cKDTree(P).query(P, k=count))
+    keep = distance <= distance[:, min(k, count - 1) - 1, None] * (1 + _TIE)
+    row = np.broadcast_to(np.arange(len(P))[:, None], near.shape)[keep]
+    lengths = np.maximum(distance[keep], _TINY)
+    half = sp.coo_array((lengths, (row, near[keep])), shape=(len(P), len(P))).tocsr()
+    return sp.csr_array(half.maximum(half.T))
+
+
+def _farthest(P: Floats, count: int) -> Ints:
+    """Return points each farthest from those before it, the first one from the middle."""
+    if count == len(P):
+        return np.arange(len(P))
+    out = np.empty(count, dtype=np.int64)
+    away = np.linalg.norm(P - P.mean(axis=0), axis=1)
+    out[0] = _first_largest(away)
+    away = np.full(len(P), np.inf)
+    for k in range(1, count):
+        np.minimum(away, np.linalg.norm(P - P[out[k - 1]], axis=1), out=away)
+        out[k] = _first_largest(away)
+    return out
+
+
+def _first_largest(values: Floats) -> int:
+    """Return the first index of the largest value, values within a tie being equal."""
+    return int(np.argmax(values >= values.max() * (1 - _TIE)))
+
+
+def _onto(uv: Floats, mid: TriMesh, flat: Floats) -> Floats:
+    """Return the scaled positions mirrored back where they are mirrored, and turned onto flat."""
+    a, b, c = (uv[mid.F[:, k]] for k in range(3))
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    if area.sum() < 0:
+        uv = uv * np.array([1.0, -1.0])
+    return register(uv, flat, np.ones(len(uv)))
+
+
+def _placed(P: Floats, mid: TriMesh, uv: Floats, options: IsomapOptions) -> Floats:
+    """Return the flat places of the mid surface's points and of blocks, (m + n, 3)."""
+    known = np.column_stack([uv, np.zeros(len(uv))])
+    flat = _first_guess(P, mid, known)
+    part = _rounds(P, options.rounds)
+    for number in range(options.rounds):
+        before = np.flatnonzero(part < number)
+        good = np.ones(len(before), dtype=bool)
+        if len(before) > options.near:
+            good = _sound(P[before], flat[before], options)
+        again = np.sort(np.concatenate([np.flatnonzero(part == number), before[~good]]))
+        held = before[good]
+        tree = _Known(
+            np.concatenate([mid.V, P[held]]), np.concatenate([known, flat[held]]), options.near
+        )
+        flat[again] = tree.place(P[again], flat[again])
+    return np.concatenate([known, flat])
+
+
+def _rounds(P: Floats, count: int) -> Ints:
+    """Return the round that places each point, (n,): drawn by its place alone."""
+    cell = np.floor(P * 8 + 0.318).astype(np.int64)
+    mixed = np.bitwise_xor.reduce(cell * _HASH, axis=1)
+    return np.asarray((mixed ^ (mixed >> 13)) % count, dtype=np.int64)
+
+
+def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
+    """Return blocks over the nearest point of the surface, as high as they are far from it."""
+    distance, near = cKDTree(mid.V).query(P)
+    near = np.asarray(near, dtype=np.int64)
+    above = np.einsum("ij,ij->i", P - mid.V[near], vertex_normals(mid.V, mid.F)[near])
+    out = known[near].copy()
+    out[:, 2] = np.where(above < 0, -distance, distance)
+    return out
+
+
+def _sound(P: Floats, flat: Floats, options: IsomapOptions) -> Bools:
+    """Return the points whose distances to their neighbours are off by no more than allowed."""
+    near = np.asarray(cKDTree(P).query(P, k=options.near)[1], dtype=np.int64)
+    out = np.ones(len(P), dtype=bool)
+    for start in range(0, len(P), _CHUNK):
+        rows = slice(start, start + _CHUNK)
+        before, after = (np.linalg.norm(Q[near[rows]] - Q[rows, None], axis=2) for Q in (P, flat))
+        off = np.abs(after - before) > options.largest
+        out[rows] &= ~off.any(axis=1)
+        out[near[rows][off]] = False
+    return out
+
+
+class _Known:
+    """Placed points, by distances to which others are placed.
+
+    Parameters
+    ----------
+    P, flat : (n, 3) float
+        The points in both spaces.
+    near : int
+        How many of the nearest count, ties included.
+    """
+
+    def __init__(self, P: Floats, flat: Floats, near: int) -> None:
+        self._flat, self._near = flat, min(near, len(P))
+        self._count = min(near + _SPARE, len(P))
+        self._tree = cKDTree(P)
+
+    def nearest(self, Q: Floats) -> tuple[Floats, Floats]:
+        """Return distance (k,) and flat place (k, 3) of the nearest placed point."""
+        distance, near = self._tree.query(Q)
+        return np.asarray(distance), self._flat[near]
+
+    def place(self, Q: Floats, guess: Floats) -> Floats:
+        """Return points (k, 3) moved from a guess to where their distances fit best."""
+        out = np.empty_like(guess)
+        for start in range(0, len(Q), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            distance, near = (np.asarray(a) for a in self._tree.query(Q[rows], k=self._count))
+            last = distance[:, self._near - 1, None]
+            weight = (distance <= last * (1 + _TIE)).astype(np.float64)
+            out[rows] = _trilaterated(guess[rows], self._flat[near], distance, weight)
+        return out
+
+
+def _trilaterated(x: Floats, at: Floats, distance: Floats, weight: Floats) -> Floats:
+    """Return points (k, 3) of the least sum of ``weight (|x - at| - distance)^2``.
+
+    ``at`` is (k, m, 3), distance and weight (k, m).  Levenberg and Marquardt, all points at once.
+    """
+    x = x.copy()
+    live, damping = np.arange(len(x)), np.full(len(x), 1e-3)
+    cost = _misfit(x, at, distance, weight)
+    for _ in range(_STEPS):
+        here, w = x[live], weight[live]
+        offset = here[:, None] - at[live]
+        length = np.maximum(np.linalg.norm(offset, axis=2), _TINY)
+        J = offset / length[..., None]
+        gradient = np.einsum("km,kmi->ki", w * (length - distance[live]), J)
+        H = np.einsum("km,kmi,kmj->kij", w, J, J)
+        H = H + (damping * w.sum(axis=1))[:, None, None] * np.eye(3)
+        step = np.linalg.solve(H, -gradient[..., None])[..., 0]
+        after = _misfit(here + step, at[live], distance[live], w)
+        better = after < cost[live]
+        x[live[better]] += step[better]
+        cost[live[better]] = after[better]
+        damping = np.clip(np.where(better, damping / 5, damping * 5), 1e-9, 1e6)
+        moving = np.abs(step).max(axis=1) > _STILL
+        live, damping = live[moving], damping[moving]
+        if not len(live):
+            break
+    return x
+
+
+def _misfit(x: Floats, at: Floats, distance: Floats, weight: Floats) -> Floats:
+    out: Floats = (weight * (np.linalg.norm(x[:, None] - at, axis=2) - distance) ** 2).sum(axis=1)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourRule:
+    """A map known at placed points: others follow by their distances to the nearest of them.
+
+    Attributes
+    ----------
+    known, placed : (n, 3) float
+        The points in both spaces.
+    options : IsomapOptions
+        As used.
+    sheet : SheetResult
+        Whose top and bottom give the stratigraphic coordinate.
+    """
+
+    known: Floats
+    placed: Floats
+    options: IsomapOptions
+    sheet: SheetResult = field(repr=False)
+
+    way_back = False
+
+    @cached_property
+    def _tree(self) -> _Known:
+        return _Known(self.known, self.placed, self.options.near)
+
+    def to_flat(self, points: Floats) -> Placed:
+        """Place folded points: at their own place where they are known, else by distances."""
+        away, guess = self._tree.nearest(points)
+        out, rest = guess.copy(), away > _OWN
+        out[rest] = self._tree.place(points[rest], guess[rest])
+        return Placed(out, self._share(out), np.ones(len(out), dtype=bool))
+
+    def _share(self, flat: Floats) -> Floats:
+        """Return how far up between bottom and top flat points lie, by the nearest vertex."""
+        layers, surfaces = self.sheet.mesh.layers, self.sheet.mesh.surfaces
+        near = np.asarray(cKDTree(self.placed[: len(layers.P), :2]).query(flat[:, :2])[1])
+        low, high = (surfaces[name][1].V[near, 2] for name in ("bottom", "top"))
+        return np.asarray((flat[:, 2] - low) / (high - low))
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Raise: there is no rule for the way back."""
+        raise InputError("method isomap has no way back: use --method sheet")

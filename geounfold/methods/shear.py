@@ -1,0 +1,46 @@
+"""Vertical simple shear: every vertical line slides as one until the reference is level."""
+
+from __future__ import annotations
+
+from geounfold.methods.contract import Body, BodyFit, carried_pair
+from geounfold.methods.heights import vertical_rule, vertical_warnings
+from geounfold.methods.sheet import sheet_stages
+
+
+def fit_shear(body: Body) -> BodyFit:
+    """Return the map that keeps x and y and takes from z the height of a reference surface.
+
+    The reference lies midway, along the vertical, between top and bottom; ``datum`` moves it to
+    the top or the bottom, or makes both level.  Volumes stay, and lengths along dipping layers
+    shrink by the cosine of the dip.  x and y are the frame's: those of the data but for a rigid
+    motion.
+
+    Raises
+    ------
+    SplitError
+        The sheet stands on end; see also ``sheet``.
+    """
+    return vertical_fit(body, body.datum)
+
+
+def vertical_fit(body: Body, datum: str) -> BodyFit:
+    """Return the map by vertical coordinates with a datum (see VerticalRule)."""
+    sheet = sheet_stages(body, "mid", 0.0)
+    with body.stage("heights"):
+        rule, at = vertical_rule(body, sheet, datum)
+        warnings, notes = vertical_warnings(at, len(body.blocks))
+        pairs = sheet.mesh.surfaces.items()
+        surfaces = {name: carried_pair(folded, rule) for name, (folded, _) in pairs}
+    return BodyFit(
+        body.hull,
+        body.split,
+        None,
+        None,
+        surfaces,
+        {},
+        sheet,
+        notes,
+        rule,
+        body.blocks,
+        warnings,
+    )

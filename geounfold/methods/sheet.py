@@ -1,0 +1,74 @@
+"""The sheet method on a body: ours."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from geounfold.methods.contract import Body, BodyFit, SurfacePair
+from geounfold.sheet import SheetResult, fit_body
+
+
+def fit_sheet(body: Body) -> BodyFit:
+    """Return the control mesh of prisms along the fitted mid surface's normals.
+
+    Raises
+    ------
+    SplitError, FlatteningError
+        As the stages do.
+    """
+    result = sheet_stages(body, body.datum, body.reach)
+    mesh = result.mesh
+    surfaces = {
+        name: SurfacePair(folded, unfolded, mesh.flattenings[name])
+        for name, (folded, unfolded) in mesh.surfaces.items()
+    }
+    notes = {
+        "rung": mesh.rungs[-1].name,
+        "rungs": [asdict(rung) for rung in mesh.rungs],
+        "roughness": result.fitted.roughness,
+        "smoothing": result.fitted.smoothing,
+        "accepted_samples": result.fitted.accepted,
+        "sharpened": result.sharpened,
+        "layers_follow": {0.0: "mid", 1.0: "top", -1.0: "bottom"}[result.fitted.lean],
+    }
+    return BodyFit(
+        body.hull,
+        body.split,
+        mesh.control,
+        mesh.shell,
+        surfaces,
+        mesh.flattenings,
+        result,
+        notes,
+    )
+
+
+def sheet_stages(body: Body, datum: str, shell: float) -> SheetResult:
+    """Return the stages of the sheet method; other methods take their surfaces from them.
+
+    Parameters
+    ----------
+    body : Body
+        See there.
+    datum : str
+        Which surface is flat.
+    shell : float
+        How far past the control mesh its shell reaches, in blocks.
+    """
+    variance = np.zeros(3) if body.hull is None else body.hull.blur_variance(body.frame.sides)
+    chosen = body.sheet_options
+    with body.stage("sheet"):
+        return fit_body(
+            body.split,
+            body.points,
+            body.blocks,
+            body.frame.steps,
+            variance,
+            0.0 if body.hull is None else body.hull.inset,
+            body.flatten,
+            replace(chosen, control=replace(chosen.control, shell=shell)),
+            datum,
+            exact=body.hull is None,
+        )

@@ -1,0 +1,22 @@
+"""The stratigraphic coordinate of geostatistics: how far up between bottom and top."""
+
+from __future__ import annotations
+
+from geounfold.methods.contract import Body, BodyFit
+from geounfold.methods.shear import vertical_fit
+
+
+def fit_stratigraphic(body: Body) -> BodyFit:
+    """Return the map that keeps x and y and makes z the proportional height.
+
+    ``z = (share - 1/2) T`` with ``share = (height - bottom) / (top - bottom)`` along the vertical
+    and T the mean vertical thickness over the blocks: the coordinate in which tabular deposits
+    are estimated where top and bottom have a height each (geostatisticslessons.com,
+    stratcoords).  ``datum`` does not matter, since both surfaces become level.
+
+    Raises
+    ------
+    SplitError
+        The sheet stands on end; see also ``sheet``.
+    """
+    return vertical_fit(body, "proportional")

@@ -32,8 +32,9 @@ def test_one_row_per_surface_and_flattener():
     assert (table.flips == 0).all()
     assert (table.seconds > 0).all()
     assert (table.overlaps == 0).all()
-    # Two triangles unfold exactly: measured 7e-16 at most.  The harmonic map makes them round.
-    shapely = table[table.flattener != "harmonic"]
+    # Two triangles unfold exactly: measured 7e-16 at most.  The harmonic map makes them round, and
+    # isomap joins the tent's far corners through the air: 4.17.
+    shapely = table[~table.flattener.isin(["harmonic", "isomap"])]
     assert (shapely.symmetric_dirichlet < 4 + 1e-9).all()
     assert (shapely.area_error < 1e-9).all()
 

@@ -9,20 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.errors import OptionError
+from geounfold.errors import FlatteningError, OptionError
 from geounfold.flattening._ladder import one_to_one
-from geounfold.flattening._problem import Problem, make_problem, upright
+from geounfold.flattening._problem import Problem, collapsed, make_problem, upright
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.arap import ArapOptions, arap
 from geounfold.flattening.harmonic import HarmonicOptions, harmonic
 from geounfold.flattening.initial import check_disk
 from geounfold.flattening.initial import tutte as _tutte
+from geounfold.flattening.isomap import IsomapOptions, isomap
 from geounfold.flattening.lscm import LscmOptions, lscm
 from geounfold.flattening.mds import MdsOptions, mds
 from geounfold.flattening.scaf import ScafOptions, scaf
 from geounfold.flattening.slim import SlimOptions, slim
 from geounfold.flattening.spring import SpringOptions, spring
 from geounfold.flattening.spring_dynamic import SpringDynamicOptions, spring_dynamic
+from geounfold.flattening.ufo import UfoOptions, ufo
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 
 __all__ = [
@@ -31,6 +33,7 @@ __all__ = [
     "Flattener",
     "Flattening",
     "HarmonicOptions",
+    "IsomapOptions",
     "LscmOptions",
     "MdsOptions",
     "ScafOptions",
@@ -38,6 +41,7 @@ __all__ = [
     "SpringDynamicOptions",
     "SpringOptions",
     "Stop",
+    "UfoOptions",
     "flatten",
     "tutte",
 ]
@@ -83,6 +87,8 @@ FLATTENERS: dict[str, Flattener] = {
         Flattener("slim", slim, False, SlimOptions),
         Flattener("scaf", scaf, False, ScafOptions, free=False),  # calls Triangle
         Flattener("mds", mds, False, MdsOptions),
+        Flattener("ufo", ufo, True, UfoOptions),
+        Flattener("isomap", isomap, False, IsomapOptions),
         Flattener("harmonic", harmonic, False, HarmonicOptions, "nothing"),
     )
 }
@@ -137,7 +143,8 @@ def flatten(
         Unknown method, options of another method, a start or rest lengths of a wrong shape or
         value, or rest lengths for a method that cannot use them.
     FlatteningError
-        The method gave no valid answer, or one that is not one-to-one and cannot be repaired.
+        The method gave no valid answer, one that has collapsed, or one that is not one-to-one
+        and cannot be repaired.
 
     Examples
     --------
@@ -156,7 +163,14 @@ def flatten(
     problem = _problem(mesh, rest, flattener)
     begin = _checked_start(start, len(problem.mesh.V), problem.mesh.F)
     flat = flattener.function(problem, begin, chosen)
-    return one_to_one(problem, flat, flattener.keeps == "lengths") if repair else flat
+    isometric = flattener.keeps == "lengths"
+    # libigl's ARAP has been seen to do so without a word (its bindings' issue 54).
+    if isometric and collapsed(problem, flat.uv):
+        raise FlatteningError(
+            f"{method}: the flat map has collapsed: most edges have lost their length; take "
+            "another method"
+        )
+    return one_to_one(problem, flat, isometric) if repair else flat
 
 
 def tutte(mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None = None) -> Floats:

@@ -18,6 +18,9 @@ Complex = NDArray[np.complex128]
 #: triangle inequality on a needle, which then is laid out with this height.
 THINNEST = 1e-9
 
+#: A map has collapsed where its median edge is shorter than this share of its rest length.
+COLLAPSED = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -132,6 +135,11 @@ def displacement(before: Floats, after: Floats) -> float:
     """Return the largest distance that a vertex moved."""
     step = after - before
     return float(np.hypot(step[:, 0], step[:, 1]).max())
+
+
+def collapsed(problem: Problem, uv: Floats) -> bool:
+    """Return whether most edges have lost their length, orientation kept or not."""
+    return bool(np.median(lengths(uv, problem.edges) / problem.rest) < COLLAPSED)
 
 
 def flip_count(uv: Floats, F: Ints) -> int:

@@ -8,16 +8,12 @@ import numpy as np
 
 from geounfold.backends import igl as backend
 from geounfold.errors import BackendError, FlatteningError
-from geounfold.flattening._problem import History, Problem, finish, flip_count
+from geounfold.flattening._problem import History, Problem, collapsed, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening.initial import tutte
 from geounfold.flattening.measures import conformal_energy
-from geounfold.geometry import lengths, triangle_areas
+from geounfold.geometry import triangle_areas
 from geounfold.mesh import Floats, Ints
-
-#: A map has collapsed where the median edge, after scaling to the folded area, is shorter than
-#: this share of its folded length.
-COLLAPSED = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +78,6 @@ def _scaled(problem: Problem, uv: Floats) -> Floats:
     if not area > 0:
         raise FlatteningError("the conformal map has collapsed: its signed area is not positive")
     scaled: Floats = uv * np.sqrt(problem.areas.sum() / area)
-    if np.median(lengths(scaled, problem.edges) / problem.rest) < COLLAPSED:
+    if collapsed(problem, scaled):
         raise FlatteningError("the conformal map has collapsed: most edges have lost their length")
     return scaled

@@ -8,9 +8,10 @@ import numpy as np
 
 from geounfold.backends.distances import SurfaceDistances
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.flattening._problem import History, Problem, finish, upright
-from geounfold.flattening._result import Flattening, Stop
-from geounfold.mesh import Floats, Ints
+from geounfold.flattening._landmarks import by_distances, to_landmarks
+from geounfold.flattening._problem import Problem
+from geounfold.flattening._result import Flattening
+from geounfold.mesh import Floats
 
 DISTANCES = ("auto", "exact", "heat")
 
@@ -20,9 +21,6 @@ EXACT_UP_TO = 600
 #: Least height of a triangle, as a share of the surface's median edge, for exact distances: on
 #: needles libigl's exact_geodesic never returns (seen with an edge of 1 mm among edges of 1 km).
 NEEDLE = 1e-3
-
-#: Second eigenvalue over the first below which the distances are those of a line.
-LINE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +50,9 @@ class MdsOptions:
 
 
 def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flattening:
-    """Flatten by classical scaling of distances along the surface.
+    """Flatten by classical scaling of distances along the surface (``_landmarks`` says how).
 
-    The plane that best reproduces the squared distances among landmarks, centred, is spanned by
-    the two largest eigenvectors (Torgerson 1952); the other vertices follow from their distances
-    to the landmarks (de Silva and Tenenbaum 2004).  Exact where the surface is developable and
+    Exact where the surface is developable and
     its flat image convex: elsewhere shortest paths bend round the border, and distances are
     shorter than in the plane.  Nothing bars triangles from folding.  A direct solve, so a start
     changes nothing.
@@ -86,16 +82,10 @@ def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flatteni
     exact &= options.distances == "exact" or len(V) <= EXACT_UP_TO
     try:
         field = SurfaceDistances((V - V.mean(axis=0)) / problem.size, F, exact)
-        chosen, D = _to_landmarks(field, V, min(options.landmarks, len(V)))
+        chosen, D = to_landmarks(field, V, options.landmarks)
     except BackendError as err:
         raise FlatteningError(f"mds: {err}") from err
-    uv = upright(_scaled(D, chosen) * problem.size, F)
-    history = History.empty(problem)
-    apart = np.linalg.norm(uv[chosen][:, None] - uv[None], axis=2)
-    history.record(uv, float(np.mean((apart - D * problem.size) ** 2)))
-    kind = "exact" if exact else "heat"
-    note = f"{kind} distances from {len(chosen)} of {len(V)} vertices"
-    return finish(problem, uv, "mds", Stop.DIRECT, 0, history, note)
+    return by_distances(problem, chosen, D * problem.size, "mds", "exact" if exact else "heat")
 
 
 def _needles(problem: Problem) -> int:
@@ -103,38 +93,3 @@ def _needles(problem: Problem) -> int:
     sides = np.abs(problem.corners - np.roll(problem.corners, 1, axis=1))
     height = 2 * problem.areas / sides.max(axis=1)
     return int(np.count_nonzero(height < NEEDLE * np.median(problem.rest)))
-
-
-def _to_landmarks(field: SurfaceDistances, V: Floats, count: int) -> tuple[Ints, Floats]:
-    """Return landmarks (k,) and the distances (k, n) from each of them.
-
-    The first is the vertex farthest from the mean, each further one the farthest from all before.
-    """
-    if count == len(V):
-        chosen = np.arange(count)
-        return chosen, np.stack([field(k) for k in range(count)])
-    nearest = np.full(len(V), np.inf)
-    following = int(np.argmax(((V - V.mean(axis=0)) ** 2).sum(axis=1)))
-    picked, rows = [], []
-    for _ in range(count):
-        picked.append(following)
-        rows.append(field(following))
-        nearest = np.minimum(nearest, rows[-1])
-        nearest[picked] = -np.inf
-        following = int(np.argmax(nearest))
-    return np.array(picked), np.stack(rows)
-
-
-def _scaled(D: Floats, chosen: Ints) -> Floats:
-    """Return plane positions (n, 2) by the distances (k, n) from the landmarks."""
-    squared = D * D
-    among = squared[:, chosen]
-    among = (among + among.T) / 2  # the heat method's differ one way and back
-    mean = among.mean(axis=0)
-    values, vectors = np.linalg.eigh(-(among - mean - mean[:, None] + mean.mean()) / 2)
-    large, small = values[-1], values[-2]
-    if not small > LINE * large:
-        raise FlatteningError("mds: the distances span no plane; take another method")
-    axes = vectors[:, [-1, -2]] / np.sqrt([large, small])
-    out: Floats = -(squared - mean[:, None]).T @ axes / 2
-    return out

@@ -120,7 +120,7 @@ def spring_dynamic(
     """
     thesis = options.stop_rule == "thesis"
     uv = _initial(problem, options) if start is None else start
-    motion = _Motion(problem, options)
+    motion = Motion(problem, options)
     history = History.empty(problem)
     run = _run_thesis if thesis else _run
     with np.errstate(over="ignore", invalid="ignore"):  # divergence is looked for, and raised
@@ -137,16 +137,33 @@ def _initial(problem: Problem, options: SpringDynamicOptions) -> Floats:
         return tutte(problem)
     if kind == "relaxed":
         return relax(RigidSteps(problem), tutte(problem), problem, 1e-3, 60)[0]
+    return plan(problem)
+
+
+def plan(problem: Problem) -> Floats:
+    """Return the vertices on the plane that fits them best, (n, 2); a fold overturned overlaps."""
     centred = problem.mesh.V - problem.mesh.V.mean(axis=0)
     axes = np.linalg.svd(centred, full_matrices=False)[2]
     return upright(centred @ axes[:2].T, problem.mesh.F)
 
 
-class _Motion:
-    """The masses, their velocity and the time step."""
+class Motion:
+    """The masses, their velocity and the time step.
 
-    def __init__(self, problem: Problem, options: SpringDynamicOptions) -> None:
-        self.problem, self.stiffness = problem, options.stiffness
+    Parameters
+    ----------
+    problem : Problem
+        The surface.
+    options : SpringDynamicOptions
+        Stiffness, density, damping and time step.
+    method : str
+        Whose motion it is, for errors.
+    """
+
+    def __init__(
+        self, problem: Problem, options: SpringDynamicOptions, method: str = "spring_dynamic"
+    ) -> None:
+        self.problem, self.stiffness, self._method = problem, options.stiffness, method
         n = len(problem.mesh.V)
         self._mass = options.density * vertex_sum(problem.areas, problem.mesh.F, n) / 3
         # Gershgorin: no oscillation is faster than w^2 = max 2 C degree / m.
@@ -167,18 +184,22 @@ class _Motion:
         self._velocity = self._keep * (self._velocity + dt * acceleration)
         return after
 
+    def still(self) -> None:
+        """Take all velocity away."""
+        self._velocity = np.zeros_like(self._velocity)
+
     def energy(self, uv: Floats) -> float:
         """Return the springs' energy, or FlatteningError where the motion has blown up."""
         value = spring_energy(uv, self.problem.edges, self.problem.rest, self.stiffness)
         if not np.isfinite(value):
             raise FlatteningError(
-                "spring_dynamic: the motion diverged; take a smaller time step or more damping"
+                f"{self._method}: the motion diverged; take a smaller time step or more damping"
             )
         return value
 
 
 def _run(
-    motion: _Motion, uv: Floats, options: SpringDynamicOptions, history: History
+    motion: Motion, uv: Floats, options: SpringDynamicOptions, history: History
 ) -> tuple[Floats, int, Stop]:
     """Step until energy and positions rest."""
     p = motion.problem
@@ -201,7 +222,7 @@ def _run(
 
 
 def _run_thesis(
-    motion: _Motion, uv: Floats, options: SpringDynamicOptions, history: History
+    motion: Motion, uv: Floats, options: SpringDynamicOptions, history: History
 ) -> tuple[Floats, int, Stop]:
     """Step until the energy or the area error rises; the positions before that step are kept."""
     p = motion.problem

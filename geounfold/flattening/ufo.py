@@ -1,0 +1,154 @@
+"""One reference surface by energy release, as the thesis describes U-Fo's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.errors import FlatteningError, OptionError
+from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
+from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening.spring_dynamic import (
+    ROUNDING,
+    WINDOW,
+    Motion,
+    SpringDynamicOptions,
+    plan,
+)
+from geounfold.mesh import Floats
+
+#: Relative rise of the energy in the first step from rest that is no rounding but a time step too
+#: large for the springs.
+RISE = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class UfoOptions:
+    """Options of ``ufo``.
+
+    Parameters
+    ----------
+    stiffness : float
+        Spring constant C.
+    density : float
+        Mass of one square unit of the surface.
+    time_step : float or None
+        Time step; None takes that of ``spring_dynamic`` with the thesis's stop rule.
+    tol : float
+        Stop where 50 steps changed the energy by at most this share of itself and moved no vertex
+        by more than this share of the surface's size.
+    max_iter : int
+        Largest number of time steps.
+    releases : int or None
+        Most releases; 1 ends where the energy first rises, as the thesis does; None goes on until
+        nothing moves.
+    """
+
+    stiffness: float = 1.0
+    density: float = 1.0
+    time_step: float | None = None
+    tol: float = 1e-5
+    max_iter: int = 5_000
+    releases: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "density", "tol", "time_step"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise OptionError(f"ufo: {name} must be positive, but is {value}")
+        for name in ("max_iter", "releases"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise OptionError(f"ufo: {name} must be at least 1, but is {value}")
+
+
+def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flattening:
+    """Flatten by releasing the springs' energy from the surface's projection on a plane.
+
+    U-Fo itself is closed.  The thesis says of it (sections 1.1, 2.3.2, 4.1) that one reference
+    surface is flattened by a conservative spring model, the one it takes over from Wang: springs
+    along the edges, as long at rest as on the folded surface; masses without damping; the
+    integrator of section 2.2.4; a planar start.  So this is ``spring_dynamic`` with its thesis
+    options, in two respects told apart:
+
+    * Each release ends where the springs' energy rises, and the next one starts there at rest,
+      until nothing moves.  The kinetic energy taken away is what is released: without damping
+      the motion would never end.  ``releases=1`` is the thesis's single release.
+    * The area error, at whose rise the thesis stops too, ends nothing: it may rise on the way.
+
+    From ``spring`` it differs by all that makes that one safe: there are no rigid steps first, no
+    second derivatives, no barrier.  Where the projection on the plane overlaps, as that of an
+    overturned fold does, the springs relax with triangles folded over and stay so; the note
+    counts them.
+
+    Parameters
+    ----------
+    problem : Problem
+        The checked surface.
+    start : (n, 2) float or None
+        Flat positions to start from; None takes the projection on the best-fit plane.
+    options : UfoOptions
+        See there.
+
+    Raises
+    ------
+    FlatteningError
+        The time step is too large for the springs.
+    """
+    motion = Motion(
+        problem,
+        SpringDynamicOptions(
+            stiffness=options.stiffness,
+            density=options.density,
+            time_step=options.time_step,
+            stop_rule="thesis",
+        ),
+        "ufo",
+    )
+    history = History.empty(problem)
+    with np.errstate(over="ignore", invalid="ignore"):  # divergence is looked for, and raised
+        begin = plan(problem) if start is None else start
+        uv, count, stop = _release(motion, begin, options, history)
+    flips = flip_count(uv, problem.mesh.F)
+    note = f"{flips} triangles are folded over: nothing bars it" if flips else ""
+    return finish(problem, uv, "ufo", stop, count, history, note)
+
+
+def _release(
+    motion: Motion, uv: Floats, options: UfoOptions, history: History
+) -> tuple[Floats, int, Stop]:
+    """Step until energy and positions rest, the velocity taken away wherever the energy rises."""
+    p, tol = motion.problem, options.tol
+    scale = options.stiffness * float((p.rest**2).sum()) / 2
+    energy = motion.energy(uv)
+    history.record(uv, energy)
+    anchor, before = uv, energy
+    fallen = releases = 0
+    for count in range(1, options.max_iter + 1):
+        after = motion.step(uv)
+        value = motion.energy(after)
+        if value <= energy + ROUNDING**2 * scale:
+            uv, energy, fallen = after, value, fallen + 1
+        elif fallen:
+            motion.still()
+            fallen, releases = 0, releases + 1
+            if releases == options.releases:
+                history.record(uv, energy)
+                return uv, count, Stop.THESIS_RULE
+        elif value > energy * (1 + RISE):
+            raise FlatteningError(
+                "ufo: the energy rises in the first step from rest; take a smaller time step"
+            )
+        else:  # at rest but for rounding
+            history.record(uv, energy)
+            return uv, count, Stop.CONVERGED
+        if count % WINDOW:
+            continue
+        history.record(uv, energy)
+        quiet = before - energy <= tol * (energy + tol**2 * scale)
+        if quiet and displacement(anchor, uv) <= tol * p.size:
+            return uv, count, Stop.CONVERGED
+        anchor, before = uv, energy
+    history.record(uv, energy)
+    return uv, options.max_iter, Stop.MAX_ITER

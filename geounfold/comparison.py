@@ -1,4 +1,4 @@
-"""Every flattener on the same surfaces, given or those of a body: one tidy table."""
+"""Every flattener on the same surfaces, or every method on the same bodies: one tidy table."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Any
 
 import pandas as pd
 
+from geounfold.contest import Blocks, compare_methods
 from geounfold.errors import GeounfoldError, OptionError
 from geounfold.flattening import FLATTENERS, Flattening, flatten, measures
 from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
 from geounfold.options import UnfoldOptions
 from geounfold.pipeline import Progress, unfold
+from geounfold.synthetic import Body
 
 Surface = TriMesh | tuple[Floats, Ints]
 
@@ -42,24 +44,33 @@ _ORDER = ("top", "bottom", "mid")
 
 
 def compare(
-    points_or_mesh: Floats | pd.DataFrame | Surface | Mapping[str, Surface],
-    flatteners: str | Iterable[str] = "all",
+    points_or_mesh: Blocks | Surface | Mapping[str, Blocks] | Mapping[str, Surface],
+    flatteners: str | Iterable[str] | None = None,
     options: Mapping[str, Any] | None = None,
     *,
+    methods: str | Iterable[str] | None = None,
+    truth: Floats | Mapping[str, Floats] | None = None,
     unfolding: UnfoldOptions | None = None,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
-    """Flatten surfaces by several methods and measure what each did to them.
+    """Flatten surfaces by several flatteners, or unfold bodies by several methods, and measure.
 
     Parameters
     ----------
-    points_or_mesh : (n, 3) array, DataFrame, TriMesh, (V, F) or a mapping of names to surfaces
+    points_or_mesh : (n, 3) array, DataFrame, simulated Body, TriMesh, (V, F) or a mapping
         A body given by its block centroids, whose top, bottom and mid surface are compared; or
         what to flatten, where a single surface is named ``surface``.  A tuple is a (V, F) pair.
-    flatteners : str or names
-        ``all`` (those that are free software throughout), one name of FLATTENERS or several.
+        A mapping holds surfaces by their names or, with ``methods``, bodies.
+    flatteners : str or names, optional
+        ``all`` (those that are free software throughout; the default for surfaces), one name of
+        FLATTENERS or several.  With ``methods`` the default is the one in ``unfolding``.
     options : mapping, optional
-        Options of some flatteners, by their names.
+        Options of some flatteners, by their names; for surfaces alone.
+    methods : str or names, optional
+        ``all``, one name of METHODS or several: whole bodies are compared, see
+        ``contest.compare_methods`` for this table.
+    truth : (n, 3) array or mapping, optional
+        With ``methods``: where the blocks truly lay.
     unfolding : UnfoldOptions, optional
         How the body's surfaces are found; defaults without.  An uncertified control mesh is no
         obstacle, since surfaces alone are needed.
@@ -79,7 +90,8 @@ def compare(
     Raises
     ------
     OptionError
-        A flattener that does not exist, or options of unfolding where surfaces are given.
+        A flattener or a method that does not exist, options of unfolding where surfaces are
+        given, a truth without methods, or surfaces or flatteners' options with them.
     InputError
         Points that are no body; see ``unfold``.
 
@@ -91,7 +103,14 @@ def compare(
     >>> table[["flattener", "flips", "error"]].to_numpy().tolist()
     [['spring', 0, ''], ['arap', 0, '']]
     """
-    names = _names(flatteners)
+    if methods is not None:
+        bodies = _bodies(points_or_mesh, options)
+        return compare_methods(
+            bodies, methods, flatteners, truth=truth, unfolding=unfolding, progress=progress
+        )
+    if truth is not None:
+        raise OptionError("a truth is compared with unfolded blocks: choose methods")
+    names = _names("all" if flatteners is None else flatteners)
     if options is not None:
         _names(options)
     rows = []
@@ -104,8 +123,19 @@ def compare(
     return table.astype(dict.fromkeys(("flips", "overlaps", "iterations"), "Int64"))
 
 
+def _bodies(given: Any, options: Mapping[str, Any] | None) -> Blocks | Mapping[str, Blocks]:
+    """Return bodies as they were given, or raise OptionError where they are surfaces."""
+    if options is not None:
+        raise OptionError("flatteners' options are for surfaces; leave them out with methods")
+    for one in given.values() if isinstance(given, Mapping) else [given]:
+        if isinstance(one, TriMesh | tuple):
+            raise OptionError("methods unfold whole bodies: give their points, not a surface")
+    bodies: Blocks | Mapping[str, Blocks] = given
+    return bodies
+
+
 def _surfaces(
-    given: Floats | pd.DataFrame | Surface | Mapping[str, Surface],
+    given: Any,
     unfolding: UnfoldOptions | None,
     progress: Progress | None,
 ) -> Mapping[str, Surface]:
@@ -114,11 +144,13 @@ def _surfaces(
         given = {"surface": given}
     if not isinstance(given, Mapping):
         chosen = replace(unfolding or UnfoldOptions(), allow_uncertified=True)
-        pairs = unfold(given, chosen, progress=progress).surfaces
+        points = given.folded if isinstance(given, Body) else given
+        pairs = unfold(points, chosen, progress=progress).surfaces
         return {name: pairs[name].folded for name in _ORDER if name in pairs}
     if unfolding is not None:
         raise OptionError("options of unfolding need a body's points, but surfaces are given")
-    return given
+    surfaces: Mapping[str, Surface] = given
+    return surfaces
 
 
 def _names(flatteners: str | Iterable[str]) -> list[str]:

@@ -562,6 +562,11 @@ class Unfolding:
         return _in_world(self.map.control, self.frame)
 
     @property
+    def torn(self) -> int:
+        """Number of blocks that came to lie far from a block that they touch."""
+        return self._torn
+
+    @property
     def outside_share(self) -> float:
         """Share of the points that the control mesh does not hold."""
         return float(np.mean(~self.carried.inside))

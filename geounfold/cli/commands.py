@@ -13,6 +13,7 @@ import numpy as np
 
 from geounfold.cli.console import Console
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
+from geounfold.cli.table import table_text
 from geounfold.errors import InputError, OptionError
 from geounfold.io import (
     Outputs,
@@ -263,28 +264,58 @@ def compare(args: Namespace, console: Console) -> None:
     """Try flatteners on one body or surface and write a table of how they did."""
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)},
-        _given(args.points, _config(args)),
+        _given(args.points, args.truth, _config(args)),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
-    names = [name.strip() for name in args.flatteners.split(",")]
-    chosen: str | list[str] = "all" if names == ["all"] else names
     how: dict[str, Any] = {"progress": console.stage}
+    if args.methods is not None:
+        how["methods"] = _listed(args.methods)
+    elif args.truth is not None:
+        raise OptionError("--truth is compared with unfolded blocks: give --methods too")
     if holds_surface(args.points):
         given: TriMesh | Floats = read_surface(args.points)
         _refuse_model_options(args)
     else:
         how["unfolding"] = _options(args)
-        given = _read(args.points, args, console).points
+        table = _read(args.points, args, console)
+        given = table.points
+        if args.truth is not None:
+            how["truth"] = _truth(args, len(table), console)
     from geounfold import comparison
 
-    frame = comparison.compare(given, chosen, **how)
+    every = "all" if args.methods is None else None
+    names = every if args.flatteners is None else _listed(args.flatteners)
+    frame = comparison.compare(given, names, **how)
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
     for _, row in frame[frame["error"] != ""].iterrows():
-        console.warn(f"{row['flattener']} failed on the {row['surface']} surface: {row['error']}")
+        if "method" in row:
+            console.warn(f"method {row['method']} failed: {row['error']}")
+        else:
+            where = f"on the {row['surface']} surface"
+            console.warn(f"{row['flattener']} failed {where}: {row['error']}")
     console.done(f"{len(frame)} rows written into {args.output}")
-    console.answer({"rows": frame.astype(object).where(frame.notna(), None).to_dict("records")})
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    console.answer({"rows": rows}, lambda: table_text(frame))
+
+
+def _listed(names: str) -> str | list[str]:
+    """Return names separated by commas, or the word all."""
+    found = [name.strip() for name in names.split(",")]
+    return "all" if found == ["all"] else found
+
+
+def _truth(args: Namespace, count: int, console: Console) -> Floats:
+    """Read where the blocks truly lay, row by row."""
+    console.stage(f"reading {args.truth}")
+    truth = read_points(args.truth, _triple(args.truth_columns), prefer=(_TRUE,))
+    if len(truth) != count:
+        raise InputError(
+            f"{args.truth}: has {len(truth)} rows, but {args.points} has {count}; rows must belong "
+            "together one by one"
+        )
+    return truth.points
 
 
 def _refuse_model_options(args: Namespace) -> None:

@@ -68,14 +68,27 @@ Sides are columns (XINC, dx, size_x and alike are found) or the steps of the cen
 turned models, bearing is the compass direction of the model's own x axis (90: not turned), plunge
 its inclination and dip that of the y axis about it, both positive up."""
 _COMPARE = """\
-rows: the top, bottom and mid surface of a body, or the surface given, by each flattener
+without --methods, rows are the top, bottom and mid surface of a body, or the surface given, by
+each flattener
 columns:
   area_error         E_s: relative difference of the triangles' areas
   edge_strain        root mean square of the edges' relative change
   area_distortion, angle_distortion, symmetric_dirichlet   1, 1 and 4 for an isometry
   flips              triangles turned over
   iterations, stop, seconds, note                          how it went
-  error              why there are no figures; empty where it worked"""
+  error              why there are no figures; empty where it worked
+
+with --methods, rows are whole bodies unfolded by each method (and each flattener, for methods that
+lay a surface flat; default the one of --flattener)
+columns:
+  epsilon_folded, epsilon_truth, epsilon_nothing   mean relative change of the distances to the
+                     neighbours: X to Y; with --truth W to Y, and W to X (doing nothing)
+  rms, rms_nothing   distance from the truth after the best rigid motion, in blocks
+  injective          whether the map is proved one-to-one
+  torn, unplaced, extrapolated                     blocks parted from a neighbour, without an
+                     image, and past the surfaces' border
+  area_error ... overlaps                          as above, of the mid surface (else the top)
+  iterations, seconds, cpu_seconds, note, error    how it went"""
 _QUALITY = """\
 figures: mean, standard deviation, 95th percentile and maximum, or one number each
   nmd_folded, nmd_unfolded, nmd_truth   mean distance to the neighbours, in the unit of the file
@@ -366,7 +379,11 @@ def _add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> 
 
 def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(
-        commands, "compare", "try every flattener on the same surfaces", common, _COMPARE
+        commands,
+        "compare",
+        "try flatteners on the same surfaces, or methods on a body",
+        common,
+        _COMPARE,
     )
     parser.add_argument(
         "points",
@@ -375,8 +392,15 @@ def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", metavar="TABLE", required=True, help=_TABLES)
     parser.add_argument(
-        "--flatteners", metavar="A,B,...", default="all", help="which ones (default all)"
+        "--flatteners", metavar="A,B,...", help="which ones, or all (default without --methods)"
     )
+    parser.add_argument(
+        "--methods", metavar="A,B,...", help="compare whole bodies by these methods, or all"
+    )
+    parser.add_argument(
+        "--truth", metavar="W", help="with --methods: the same points, as they truly lay"
+    )
+    parser.add_argument("--truth-columns", metavar="A,B,C", help="coordinate columns of W")
     _add_columns(parser)
     _add_model(parser, "how a body's surfaces are found")
 

@@ -37,9 +37,11 @@ METHODS: dict[str, Method] = {
         Method("sheet", fit_sheet, "sheet_options"),
         Method("thesis", fit_thesis, "thesis_options", reach=_FAR, hull="alpha", surfaces=False),
         Method("ufo", fit_ufo, "sheet_options", reach=_FAR),
-        Method("stratigraphic", fit_stratigraphic, "vertical_options", control=False),
-        Method("shear", fit_shear, "vertical_options", control=False),
+        Method(
+            "stratigraphic", fit_stratigraphic, "vertical_options", control=False, flattens=False
+        ),
+        Method("shear", fit_shear, "vertical_options", control=False, flattens=False),
         Method("volumetric", fit_volumetric, "volumetric_options", reach=_FAR),
-        Method("isomap", fit_isomap, "isomap_options", control=False),
+        Method("isomap", fit_isomap, "isomap_options", control=False, flattens=False),
     )
 }

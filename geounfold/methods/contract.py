@@ -226,6 +226,8 @@ class Method:
         What the hull ``auto`` stands for.
     surfaces : bool
         Whether it takes reference surfaces in place of a hull.
+    flattens : bool
+        Whether the flattener matters to it.
     """
 
     name: str
@@ -235,6 +237,7 @@ class Method:
     reach: float | None = None
     hull: str = "auto"
     surfaces: bool = True
+    flattens: bool = True
 
 
 def mean_top_normal(parts: SurfaceSplit) -> Floats:

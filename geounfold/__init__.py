@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from geounfold.pipeline import Unfolding, unfold
     from geounfold.quality import aligned_rms, epsilon, neighbours, nmd
     from geounfold.synthetic import simulate
+    from geounfold.verification import CrossCheck, crosscheck
 
 _HOMES = {
     "BlockModel": "blockmodel",
@@ -43,6 +44,8 @@ _HOMES = {
     "transfer": "blockmodel",
     "compare": "comparison",
     "ControlMesh": "control",
+    "CrossCheck": "verification",
+    "crosscheck": "verification",
     "DrillHoles": "drillholes",
     "read_drillholes": "drillholes",
     "GeounfoldError": "errors",
@@ -69,6 +72,7 @@ __all__ = [
     "FLATTENERS",
     "BlockModel",
     "ControlMesh",
+    "CrossCheck",
     "DrillHoles",
     "Flattening",
     "GeounfoldError",
@@ -84,6 +88,7 @@ __all__ = [
     "axes_from_angles",
     "block_model",
     "compare",
+    "crosscheck",
     "epsilon",
     "flatten",
     "load",

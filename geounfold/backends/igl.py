@@ -238,9 +238,86 @@ class ArapSteps:
         return _finite(np.asarray(after, dtype=np.float64), self._n, "arap_solve")
 
 
-def _finite(uv: Floats, n: int, name: str) -> Floats:
-    """Return uv, or BackendError where it is not (n, 2) and finite (libigl issue 2439)."""
-    if uv.shape != (n, 2) or not np.isfinite(uv).all():
+class TetDeformation:
+    """Deformations of tetrahedra whose boundary, or any other vertices, are held in given places.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices at rest.
+    T : (m, 4) int
+        Right-handed tetrahedra.
+    held : (k,) int
+        Vertices whose places are given.
+    """
+
+    def __init__(self, V: Floats, T: Ints, held: Ints) -> None:
+        self._V, self._T, self._held = _f(V), _i(T), _i(held)
+
+    def harmonic(self, places: Floats) -> Floats:
+        """Return all places (n, 3), harmonic over the rest shape, held ones at places (k, 3).
+
+        Raises
+        ------
+        BackendError
+            libigl refused, or returned something that is not finite.
+        """
+        if len(self._held) == len(self._V):
+            return self._in_order(places)
+        try:
+            out = igl.harmonic(self._V, self._T, self._held, _f(places), 1)
+        except RuntimeError as err:
+            msg = f"libigl's harmonic failed: {err}"
+            raise BackendError(msg) from err
+        return _finite(np.asarray(out, dtype=np.float64), len(self._V), "harmonic", 3)
+
+    def rigid(self, places: Floats, start: Floats, tol: float, max_iter: int) -> tuple[Floats, int]:
+        """Return all places (n, 3), as rigid as possible, and the number of local-global steps.
+
+        Parameters
+        ----------
+        places : (k, 3) float
+            Of the held vertices.
+        start : (n, 3) float
+            All places to start from.
+        tol : float
+            Stop where a step moves no vertex by more than this, in the vertices' unit.
+        max_iter : int
+            Largest number of steps.
+
+        Raises
+        ------
+        BackendError
+            libigl refused, or returned something that is not finite.
+        """
+        if len(self._held) == len(self._V):
+            return self._in_order(places), 0
+        data = igl.ARAPData()
+        data.max_iter = 1
+        now = _f(start)
+        try:
+            igl.arap_precomputation(self._V, self._T, 3, self._held.astype(np.int32), data)
+            for step in range(1, max_iter + 1):
+                after = np.asarray(igl.arap_solve(_f(places), data, now), dtype=np.float64)
+                _finite(after, len(self._V), "arap_solve", 3)
+                moved = float(np.abs(after - now).max())
+                now = after
+                if moved <= tol:
+                    return now, step
+        except RuntimeError as err:
+            msg = f"libigl's arap failed: {err}"
+            raise BackendError(msg) from err
+        return now, max_iter
+
+    def _in_order(self, places: Floats) -> Floats:
+        out = np.empty_like(self._V)
+        out[self._held] = places
+        return out
+
+
+def _finite(uv: Floats, n: int, name: str, dim: int = 2) -> Floats:
+    """Return uv, or BackendError where it is not (n, dim) and finite (libigl issue 2439)."""
+    if uv.shape != (n, dim) or not np.isfinite(uv).all():
         msg = f"libigl's {name} returned positions that are not finite"
         raise BackendError(msg)
     return uv

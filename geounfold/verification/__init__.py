@@ -104,6 +104,7 @@ def crosscheck(
         meshes=tuple(run.meshes),
         places=tuple(run.places),
         differences=run.differences,
+        points=run.points,
         grids=run.grids,
     )
 
@@ -127,6 +128,7 @@ class _Run:
         self.meshes: list[MeshFigures] = []
         self.places: list[PlaceFigures] = []
         self.differences: dict[str, Floats] = {}
+        self.points: dict[str, Floats] = {}
         self.grids: dict[str, TetMesh] = {}
 
     def mesh(self, name: str) -> None:
@@ -164,9 +166,9 @@ class _Run:
         seconds = time.perf_counter() - started
         apart = there - self._ours
         distance = np.linalg.norm(apart, axis=1)
-        spread = np.full(self._count, np.nan)
-        spread[self._rows] = distance
-        self.differences[f"{name}_{interior}"] = spread
+        key = f"{name}_{interior}"
+        self.differences[key] = self._spread(distance)
+        self.points[key] = self._spread(there * self._frame.scale)
         if name == PRISM:
             self._same[interior] = there
         known = np.flatnonzero(carrier.found)
@@ -190,6 +192,12 @@ class _Run:
             steps=steps,
             seconds=seconds,
         )
+
+    def _spread(self, values: Floats) -> Floats:
+        """Return values of the points that were compared among all points, NaN for the others."""
+        out = np.full((self._count, *values.shape[1:]), np.nan)
+        out[self._rows] = values
+        return out
 
 
 def _rms(values: Floats) -> float:

@@ -140,6 +140,8 @@ class CrossCheck:
     differences : dict of (n,) float
         By ``mesh_interior``: how far each point's place is from ours, in blocks; NaN where it was
         not compared (outside).
+    points : dict of (n, 3) float
+        By the same names: the points unfolded by that mesh, in the input's unit; NaN likewise.
     grids : dict of TetMesh
         The meshes by name, folded, in the input's coordinates.
     """
@@ -152,6 +154,7 @@ class CrossCheck:
     meshes: tuple[MeshFigures, ...]
     places: tuple[PlaceFigures, ...]
     differences: Mapping[str, Floats]
+    points: Mapping[str, Floats]
     grids: Mapping[str, TetMesh]
 
     @property

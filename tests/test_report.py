@@ -24,6 +24,7 @@ SMALL = ViewOptions(size=(80, 60))
 GRID = np.stack(np.meshgrid(*[np.arange(float(n)) for n in (6, 5, 4)], indexing="ij"), -1)
 SLAB = GRID.reshape(-1, 3)
 COLUMNS = {"stratigraphic": SLAB[:, 2] / 3, "shear": SLAB[:, 0] / 5, "location": ["inside"] * 120}
+PROVED = {"injective": True, "tetrahedra": 6, "boundary_faces": 12}
 SOUND = {"inverted_folded": 0, "inverted_unfolded": 0, "injective": True, "outside_share": 0.0}
 SUMMARY = SOUND | {
     "version": "9.8.7",
@@ -102,6 +103,12 @@ def test_a_summary_without_anything_still_gives_a_page():
         ({}, "good", "proved"),
         ({"injective": False}, "bad", "not proved"),  # looked at, and at fault
         ({"injective": None}, "care", "not proved"),
+        # The tetrahedra are proved, other coordinates are used between their corners.
+        (
+            {"injective": False, "certificate": PROVED, "coordinates": {"name": "mvc"}},
+            "care",
+            "not",
+        ),
         ({"outside_share": 0.02}, "care", "2.00% of the blocks"),
         ({"inverted_unfolded": 1}, "bad", "folds over itself"),
         ({"inverted_folded": 5, "outside_share": 0.5}, "bad", "folds over itself"),
@@ -112,6 +119,13 @@ def test_the_verdict_follows_the_worst_thing_known(change, level, said):
     given = verdict(SOUND | change)
     assert given.level == level
     assert said in given.headline
+
+
+def test_other_coordinates_are_told_from_what_is_proved():
+    facts = {"injective": False, "certificate": PROVED, "coordinates": {"name": "mvc"}}
+    reasons = verdict(SOUND | facts).reasons
+    assert any(r.startswith("Proved: 6 tetrahedra") for r in reasons)
+    assert any(r.startswith("Not proved: inside the prisms") and "mvc" in r for r in reasons)
 
 
 @needs_rendering

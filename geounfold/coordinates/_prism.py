@@ -24,7 +24,13 @@ EDGES = tuple(
 )
 """The border's twelve edges, lower corner first."""
 
-_FOLD = 1e-6  # share of the size by which every fold of the border must bulge out to be convex
+_FOLD = 1e-3
+"""Share of the size by which every fold of the border must bulge out to be convex.
+
+Wachspress coordinates change from linear to bilinear on a split quadrilateral within a depth of
+about its bulge.  Measured at the faces of four folded bodies' control meshes: with bulges from
+1e-6 on, determinants of the map fall to -12; from 1e-4 on, to 0.07; from 1e-3 on, to 0.81.
+"""
 
 
 def opposite_edges() -> tuple[np.ndarray, Floats]:
@@ -76,8 +82,8 @@ def face_normals(corners: Floats) -> Floats:
 def convex(corners: Floats) -> Bools:
     """Return which prisms (n, 6, 3) are strictly convex, every split quadrilateral bulging out.
 
-    A fold of less than a millionth of the prism's size counts as none, and as not convex: the
-    border of a plane quadrilateral is not the split one's for every kind of coordinates.
+    A bulge of less than a thousandth of the prism's size counts as none, and as not convex: on a
+    plane quadrilateral Wachspress coordinates are bilinear, not those of the split one.
     """
     C = np.ascontiguousarray(corners.transpose(2, 1, 0))
     normal = face_normals(C)

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from geounfold.backends.igl import barycentric_in_tets, upright
 from geounfold.control import ControlMesh
 from geounfold.coordinates._prism import convex
-from geounfold.coordinates.mean_value import mean_value
-from geounfold.coordinates.wachspress import wachspress
+from geounfold.coordinates.mean_value import mean_value, mean_value_gradients
+from geounfold.coordinates.wachspress import wachspress, wachspress_gradients
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.prisms import whole_prisms
 
@@ -32,7 +33,9 @@ _INSIDE = -1e-9  # barycentric coordinate down to which a point counts as inside
 _STEPS = 50  # of Newton's method
 _HALVINGS = 12
 _DECREASE = 1e-4  # share of a step's promise that the residual has to shrink by
-_CHUNK = 1 << 12  # points at once: 20 MB, and they stay in the cache
+_CHUNK = 1 << 11  # points at once: 8 MB
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +134,8 @@ class PrismInterpolant:
         """
         image, third = np.empty_like(points), np.empty(len(points))
         for here in _chunks(len(points)):
-            corners = self.corners[self.prism[element[here]]]
-            values, _ = self._at(points[here], self.prism[element[here]])
+            prism = self.prism[element[here]]
+            corners, values = self.corners[prism], self._values(points[here], prism)
             image[here] = np.einsum("ni,nij->nj", values, self.control.unfolded.V[corners])
             third[here] = np.einsum("ni,ni->n", values, self.control.stratigraphic[corners])
         return image, third
@@ -142,7 +145,7 @@ class PrismInterpolant:
         out = np.empty((len(points), 3, 3))
         for here in _chunks(len(points)):
             prism = self.prism[element[here]]
-            _, slopes = self._at(points[here], prism)
+            _, slopes = self._slopes(points[here], prism)
             out[here] = _jacobian(self.control.unfolded.V[self.corners[prism]], slopes)
         return out
 
@@ -176,18 +179,28 @@ class PrismInterpolant:
             third[here] = np.einsum("ni,ni->n", values, heights)
         return image, third, solved
 
-    def _at(self, points: Floats, prism: Ints) -> tuple[Floats, Floats]:
+    def _values(self, points: Floats, prism: Ints) -> Floats:
+        """Return coordinates (k, 6) of folded points in prisms (k,)."""
+        values = np.empty((len(points), 6))
+        for rows, kind in self._by_kind(prism, wachspress, mean_value):
+            corners = self.control.folded.V[self.corners[prism[rows]]]
+            values[rows] = kind(points[rows], corners)
+        return values
+
+    def _slopes(self, points: Floats, prism: Ints) -> tuple[Floats, Floats]:
         """Return coordinates (k, 6) and gradients (k, 6, 3) of folded points in prisms (k,)."""
         values, slopes = np.empty((len(points), 6)), np.empty((len(points), 6, 3))
-        rational = self.rational[prism]
-        for rows, kind in (
-            (np.flatnonzero(rational), wachspress),
-            (np.flatnonzero(~rational), mean_value),
-        ):
-            if len(rows):
-                corners = self.control.folded.V[self.corners[prism[rows]]]
-                values[rows], slopes[rows] = kind(points[rows], corners)
+        for rows, kind in self._by_kind(prism, wachspress_gradients, mean_value_gradients):
+            corners = self.control.folded.V[self.corners[prism[rows]]]
+            values[rows], slopes[rows] = kind(points[rows], corners)
         return values, slopes
+
+    def _by_kind(self, prism: Ints, first: _T, second: _T) -> Iterator[tuple[Ints, _T]]:
+        """Yield the rows whose prisms have Wachspress coordinates, and those that have not."""
+        rational = self.rational[prism]
+        for rows, kind in ((np.flatnonzero(rational), first), (np.flatnonzero(~rational), second)):
+            if len(rows):
+                yield rows, kind
 
     def _solve(self, target: Floats, prism: Ints, start: Floats) -> tuple[Floats, Floats, Bools]:
         """Return folded points (k, 3), their coordinates (k, 6) and which of them are solved."""
@@ -195,7 +208,7 @@ class PrismInterpolant:
 
         def off(rows: Ints, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
             with np.errstate(all="ignore"):  # a trial on a border has no weights, and is refused
-                values, slopes = self._at(x, prism[rows])
+                values, slopes = self._slopes(x, prism[rows])
                 missing = target[rows] - np.einsum("ni,nij->nj", values, there[rows])
             return values, slopes, missing, np.linalg.norm(missing, axis=1)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from geounfold.coordinates._prism import EDGES, TRIANGLES, cross, dot, opposite_edges
@@ -15,8 +17,8 @@ _NEEDLE = 1e-3  # sine-like height of a spherical triangle below which it is tak
 _TINY = 1e-300
 
 
-def mean_value(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
-    """Return mean value coordinates of points inside prisms, and their gradients.
+def mean_value(points: Floats, corners: Floats) -> Floats:
+    """Return mean value coordinates of points inside prisms.
 
     The triangle with corners at r_i from the point, seen as a spherical one, has the mean vector
     ``m = sum theta_i n_i / 2`` with the angle theta_i of the edge opposite to i and the unit
@@ -36,32 +38,93 @@ def mean_value(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
+    (n, 6) float
+        Sum 1.
+    """
+    W = _gathered(_view(points, corners).share.swapaxes(0, 1))
+    return np.ascontiguousarray((W / W.sum(axis=0)).T)
+
+
+def mean_value_gradients(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """Return the same with their gradients.
+
+    Differentiating ``sum w_i r_i = m`` gives ``sum dw_i r_i = dm + (sum w_i) dx``, solved as the
+    weights were.
+
+    Returns
+    -------
     values : (n, 6) float
         Sum 1.
     gradients : (n, 6, 3) float
         Per length; sum 0.
     """
+    view = _view(points, corners)
+    slopes = _slopes(view).transpose(1, 2, 0, 3)
+    return normalised(_gathered(view.share.swapaxes(0, 1)), _gathered(slopes))
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """Prisms as seen from a point in each.
+
+    Attributes
+    ----------
+    r, d : (3, 6, n), (6, n) float
+        Corners from the point, and their distances.
+    c, area : (3, 12, n), (12, n) float
+        Cross products of EDGES' ends, and their lengths.
+    ratio : (12, n) float
+        The angle of each edge over that length.
+    normal : (3, 8, 3, n) float
+        r_j x r_k for every corner of TRIANGLES.
+    det : (8, n) float
+        Six times the volume under each; 1 where that is 0.
+    share : (3, 8, n) float
+        The weights.
+    """
+
+    r: Floats
+    d: Floats
+    c: Floats
+    area: Floats
+    ratio: Floats
+    normal: Floats
+    det: Floats
+    share: Floats
+
+
+def _view(points: Floats, corners: Floats) -> _View:
     r = np.ascontiguousarray(corners.transpose(2, 1, 0)) - points.T[:, None]
     d = np.sqrt(dot(r, r))
     c = cross(r[:, _I], r[:, _J])
     area = np.sqrt(dot(c, c))
     theta = np.arctan2(area, dot(r[:, _I], r[:, _J]))
     ratio = np.where(area > _TINY, theta / np.maximum(area, _TINY), 1 / (d[_I] * d[_J]))
-    normal = _SENSE[..., None] * c[:, _OPPOSITE]  # (3, 8, 3, n): r_j x r_k
-    pull = _SENSE[..., None] * ratio[_OPPOSITE]  # theta over area, signed
-    mean = (ratio * c)[:, _OPPOSITE]
-    mean = 0.5 * np.einsum("tk,atkn->atn", _SENSE, mean)
+    normal = _SENSE[..., None] * c[:, _OPPOSITE]
+    mean = _around(ratio * c)
     det = dot(r[:, _FACES[:, 0]], normal[:, :, 0])
-    safe = np.where(det == 0, 1.0, det)
-    share = np.where(det == 0, 0.0, dot(normal, mean[:, :, None]).swapaxes(0, 1) / safe)
+    flat = det == 0
+    safe = np.where(flat, 1.0, det)
+    share = np.stack([dot(normal[:, :, k], mean) / safe for k in range(3)])
+    share[:, flat] = 0.0
     share = _without_needles(share, det, d, theta, area)
-    slopes = _slopes(r, d, c, area, ratio, pull, normal, share.sum(axis=0), safe)
-    W, G = np.zeros((6, len(points))), np.zeros((6, 3, len(points)))
-    for t, face in enumerate(TRIANGLES):
-        for k, corner in enumerate(face):
-            W[corner] += share[k, t]
-            G[corner] += slopes[:, t, k]
-    return normalised(W, G)
+    return _View(r, d, c, area, ratio, normal, safe, share)
+
+
+def _around(edges: Floats) -> Floats:
+    """Return half the sums around TRIANGLES, (3, 8, n), of what EDGES have, (3, 12, n)."""
+    a, b, c = (0.5 * _SENSE[:, k, None] * edges[:, _OPPOSITE[:, k]] for k in range(3))
+    out: Floats = a + b + c
+    return out
+
+
+def _gathered(parts: Floats) -> Floats:
+    """Return the sums (6, ...) over the corners of TRIANGLES of parts (8, 3, ...)."""
+    out = np.zeros((6, *parts.shape[2:]))
+    for face, part in zip(TRIANGLES, parts, strict=True):
+        for corner, one in zip(face, part, strict=True):
+            out[corner] += one
+    return out
 
 
 def _without_needles(share: Floats, det: Floats, d: Floats, theta: Floats, area: Floats) -> Floats:
@@ -105,27 +168,15 @@ def _without_needles(share: Floats, det: Floats, d: Floats, theta: Floats, area:
     return out
 
 
-def _slopes(
-    r: Floats,
-    d: Floats,
-    c: Floats,
-    area: Floats,
-    ratio: Floats,
-    pull: Floats,
-    normal: Floats,
-    total: Floats,
-    det: Floats,
-) -> Floats:
-    """Return the gradients of the weights, (3, 8, 3, n).
-
-    Differentiating ``sum w_i r_i = m`` gives ``sum dw_i r_i = dm + (sum w_i) dx``, solved as the
-    weights were.
-    """
-    unit = c / np.maximum(area, _TINY)
+def _slopes(view: _View) -> Floats:
+    """Return the gradients of the weights, (3, 8, 3, n): of every corner of TRIANGLES."""
+    r, c, normal, square = view.r, view.c, view.normal, view.d**2
+    unit = c / np.maximum(view.area, _TINY)
     e = r[:, _I] - r[:, _J]
-    turn = cross(unit, r[:, _I]) / d[_I] ** 2 - cross(unit, r[:, _J]) / d[_J] ** 2
-    turn -= ratio * cross(e, unit)
-    drift = 0.5 * (pull * e[:, _OPPOSITE]).sum(axis=2)  # (3, 8, n)
+    turn = cross(unit, r[:, _I]) / square[_I] - cross(unit, r[:, _J]) / square[_J]
+    turn -= view.ratio * cross(e, unit)
+    drift = _around(view.ratio * e)
+    total = view.share.sum(axis=0)
     out = np.empty_like(normal)
     for i in range(3):
         mine = normal[:, :, i]
@@ -133,5 +184,5 @@ def _slopes(
         for j in range(3):
             edges, sense = _OPPOSITE[:, j], 0.5 * _SENSE[:, j, None]
             row += sense * dot(mine, unit[:, edges]) * turn[:, edges]
-        out[:, :, i] = row / det
+        out[:, :, i] = row / view.det
     return out

@@ -14,6 +14,9 @@ from geounfold.control import ControlMesh
 from geounfold.errors import ControlMeshError
 from geounfold.geometry import lengths, sorted_distinct
 from geounfold.mesh import Floats, Ints, TetMesh
+from geounfold.threads import over_slices
+
+_SLICE = 1 << 12  # tetrahedra at once
 
 
 def deformation_gradients(control: ControlMesh, elements: Ints | None = None) -> Floats:
@@ -96,7 +99,12 @@ def distortion(J: Floats) -> Distortion:
     (1.0, 0.5, 1.0)
     """
     J = np.asarray(J, dtype=np.float64)
-    stretch = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
+    stretch = np.empty((len(J), 3))
+
+    def work(rows: slice) -> None:
+        stretch[rows] = np.linalg.svd(J[rows], compute_uv=False)
+
+    over_slices(work, len(J), _SLICE)
     volume = np.linalg.det(J)
     gradient = J[:, 2, :]  # J^T e_z
     thickness: Floats = np.linalg.norm(gradient, axis=1)

@@ -24,7 +24,7 @@ from geounfold.lattice import (
     point_spacing,
     proper_permutations,
 )
-from geounfold.mesh import Floats
+from geounfold.mesh import Floats, Ints
 
 DECISIVE = 1e-11
 """Moments (of unit variance along each axis) closer than this count as equal.
@@ -102,6 +102,21 @@ class Frame:
         part = cells - whole
         on = np.logical_and(part < TOLERANCE, part > -TOLERANCE).all(axis=1, keepdims=True)
         out: Floats = np.where(on, whole * self.steps + 0.0, points_work)
+        return out
+
+    def cells(self, points_work: Floats) -> Ints | None:
+        """Return the lattice cell of every working point, (n, 3).
+
+        None without a lattice, and where a point lies off it (see ``snap``).
+        """
+        if self.steps is None:
+            return None
+        cells = points_work / self.steps
+        whole = np.rint(cells)
+        cells -= whole
+        if cells.size and not -TOLERANCE < cells.min() <= cells.max() < TOLERANCE:
+            return None
+        out: Ints = whole.astype(np.int64)
         return out
 
     def up_in_work(self, world_up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Floats:

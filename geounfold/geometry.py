@@ -5,6 +5,8 @@ Signs are kept: a volume or an area is negative where an element is turned insid
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from geounfold.mesh import Floats, Ints, TriMesh
@@ -39,6 +41,16 @@ def lengths(V: Floats, E: Ints) -> Floats:
     """Return the length of each edge, (k,), in the vertices' unit."""
     out: Floats = np.linalg.norm(V[E[:, 1]] - V[E[:, 0]], axis=1)
     return out
+
+
+def lengths_between(a: Sequence[Floats], b: Sequence[Floats]) -> Floats:
+    """Return the distances between points given by columns x, y, z, (k,) each."""
+    square = np.zeros_like(a[0])
+    for p, q in zip(a, b, strict=True):
+        d = q - p
+        d *= d
+        square += d
+    return np.sqrt(square, out=square)
 
 
 def cross2(a: Floats, b: Floats) -> Floats:

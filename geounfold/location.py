@@ -12,9 +12,8 @@ A point's answer depends on the point and the tetrahedra alone, whatever points 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geounfold.mesh import Floats, Ints
+from geounfold.mesh import Floats, Ints, Numbers
 
 ON_FACE = 1e-12
 """A barycentric coordinate above minus this counts as not negative: rounding on a face."""
@@ -29,7 +28,6 @@ _GROWTH = 2  # cells by which the grid's tetrahedra are spread into empty ones
 _LONGEST = 2048  # cells along an axis
 
 Columns = tuple[Floats, Floats, Floats]
-Numbers = NDArray[np.int32]
 
 
 class TetWalk:

@@ -17,9 +17,9 @@ from geounfold.distortion import deformation_gradients
 from geounfold.errors import InputError, OptionError
 from geounfold.frame import Frame
 from geounfold.geometry import boundary_faces
-from geounfold.location import Numbers, TetWalk
+from geounfold.location import TetWalk
 from geounfold.mapfile import read_arrays, write_arrays
-from geounfold.mesh import Bools, Floats, Ints, TetMesh
+from geounfold.mesh import Bools, Floats, Ints, Numbers, TetMesh
 from geounfold.threads import over_slices, slices
 
 INSIDE, EXTRAPOLATED, OUTSIDE = "inside", "extrapolated", "outside"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Numbers = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 Space = Literal["folded", "unfolded"]

@@ -147,7 +147,7 @@ def unfold(
     _check_certified(certificate, chosen)
     _check_placed(groups, P, carried, chosen)
     with clock.stage("quality"):
-        quality = _quality(mapping, carried, P, frame, chosen.neighbours)
+        quality = _quality(mapping, carried, P, frame, given, chosen.neighbours)
         torn = _torn(groups, given, carried, quality, frame)
     _check_coordinates(quality, returned, P, chosen)
     _check_torn(torn, P, chosen)
@@ -328,14 +328,21 @@ def _certificate(
 
 
 def _quality(
-    mapping: UnfoldingMap | PointwiseMap, carried: Carried, P: Floats, frame: Frame, k: int
+    mapping: UnfoldingMap | PointwiseMap,
+    carried: Carried,
+    P: Floats,
+    frame: Frame,
+    given: Floats,
+    k: int,
 ) -> Quality:
     """Return how good the answer is: by the control mesh, or by each block's neighbours."""
     if isinstance(mapping, PointwiseMap):
         return assess_points(P, carried.points, frame.scale**3, k)
     world, whole = (_in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
     gradients = _gradients(mapping, P, carried)
-    return assess(world, whole, carried.element, P, carried.points, k, gradients)
+    cells = frame.cells(given)
+    lattice = None if cells is None or frame.steps is None else (cells, frame.steps)
+    return assess(world, whole, carried.element, P, carried.points, k, gradients, lattice)
 
 
 def _in_data(certificate: Certificate, frame: Frame) -> Certificate:

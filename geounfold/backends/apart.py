@@ -13,6 +13,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from importlib import import_module
@@ -54,14 +55,16 @@ def call_apart(
         {"function": np.array(function), **{f"in_{k}": v for k, v in arguments.items()}}
     )
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", _START],
-            input=request,
-            capture_output=True,
-            timeout=limit,
-            env={**os.environ, "PYTHONPATH": _search_path()},
-            check=False,
-        )
+        with tempfile.TemporaryDirectory() as folder:  # fTetWild leaves files where it runs
+            done = subprocess.run(
+                [sys.executable, "-P", "-c", _START],
+                input=request,
+                capture_output=True,
+                timeout=limit,
+                env={**os.environ, "PYTHONPATH": _search_path()},
+                cwd=folder,
+                check=False,
+            )
     except subprocess.TimeoutExpired as error:
         raise BackendError(f"{name} took longer than {limit:g} s and was stopped") from error
     except OSError as error:

@@ -206,7 +206,7 @@ def block_sides(points: Floats) -> Floats:
     """
     if len(points) < 2:
         return np.ones(3)
-    steps = [_level_step(column) for column in points.T]
+    steps = [level_step(column) for column in points.T]
     known = np.array([step for step in steps if step is not None])
     if len(known) == 3:
         return known
@@ -216,7 +216,7 @@ def block_sides(points: Floats) -> Floats:
     return np.full(3, 1.08 * spacing if spacing > 0 else 1.0)  # no slits between turned cubes
 
 
-def _level_step(column: Floats) -> float | None:
+def level_step(column: Floats) -> float | None:
     """Return the step of coordinates that lie on equally spaced levels, else None."""
     levels = np.unique(column)
     gaps = np.diff(levels)

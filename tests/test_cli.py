@@ -25,6 +25,7 @@ from geounfold.control import ControlMesh
 from geounfold.errors import HullError, InputError, MissingDependencyError
 from geounfold.frame import Frame
 from geounfold.mesh import TetMesh
+from geounfold.report import CarriedHoles, CarriedPoints
 
 COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
 COMMANDS += ["init", "doctor", "completion"]
@@ -157,11 +158,14 @@ def test_unfold_writes_everything(
 ) -> None:
     seen: dict[str, Any] = {}
 
-    def write_report(path: Path, summary: Any, folded: Any, unfolded: Any, columns: Any) -> None:
-        seen.update(summary=summary, folded=folded, unfolded=unfolded, columns=columns)
+    def write_report(
+        path: Path, summary: Any, folded: Any, unfolded: Any, columns: Any, *, holes: Any
+    ) -> None:
+        seen.update(summary=summary, folded=folded, unfolded=unfolded, columns=columns, holes=holes)
         path.write_text("<html>")
 
-    _replace(monkeypatch, "report", write_report=write_report)
+    kinds = {"CarriedHoles": CarriedHoles, "CarriedPoints": CarriedPoints}
+    _replace(monkeypatch, "report", write_report=write_report, **kinds)
     _replace(monkeypatch, "plotting", check_rendering=lambda: None)
     (tmp_path / "q.csv").write_text("hole;x;y;z\na;1;1;1\n")
     argv = [
@@ -197,6 +201,10 @@ def test_unfold_writes_everything(
     assert seen["summary"]["points"] == 3
     assert list(seen["columns"])[:6] == RESULTS
     np.testing.assert_array_equal(seen["unfolded"], seen["folded"] + SHIFT)
+    samples = seen["holes"].samples
+    np.testing.assert_array_equal(samples.unfolded, samples.folded + SHIFT)
+    assert list(samples.columns) == ["stratigraphic", "location"]
+    assert list(seen["columns"]["id"]) == ["007", "", "9"]
 
 
 def test_options_reach_the_pipeline(points: Path, calls: list[dict[str, Any]]) -> None:

@@ -116,12 +116,13 @@ def unfold(args: Namespace, console: Console) -> None:
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
         if "--report" in parts:
+            from geounfold.cli.reporting import report_columns, report_holes
             from geounfold.report import write_report
 
-            there = np.isfinite(result.points).all(axis=1)  # blocks without an image: no picture
-            drawn = {name: np.asarray(values)[there] for name, values in columns.items()}
-            blocks = table.points[there], result.points[there]
-            write_report(parts["--report"], summary, *blocks, drawn)
+            drawn = report_columns(table, columns)
+            drilled = report_holes(holes, traced, samples, carried)
+            blocks = table.points, result.points
+            write_report(parts["--report"], summary, *blocks, drawn, holes=drilled)
     for warning in warnings:
         console.warn(str(warning))
     if carried is not None:

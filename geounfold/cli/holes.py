@@ -42,7 +42,7 @@ class HoleData:
     length : float or None
         Of composites, where samples are these.
     samples, traces : DataFrame or None
-        Where an output asks for them.
+        Where an output or the report asks for them.
     """
 
     holes: DrillHoles
@@ -73,10 +73,10 @@ class HoleData:
 
     def write(self, parts: Mapping[str, Path], results: Mapping[str, dict[str, Any]]) -> None:
         """Write the outputs that were asked for."""
-        if self.samples is not None:
+        if self.samples is not None and "--samples-out" in parts:
             frame = with_columns(self.samples, results["samples"])
             write_table(parts["--samples-out"], frame, columns=_XYZ)
-        if self.traces is not None:
+        if self.traces is not None and "--traces-out" in parts:
             _write_traces(parts["--traces-out"], self.traces, results["traces"])
 
 
@@ -95,7 +95,7 @@ def check_hole_options(args: Namespace) -> None:
         return
     if getattr(args, "samples", None) is not None:
         raise OptionError("--samples and --holes exclude each other: both go to --samples-out")
-    if args.samples_out is None and args.traces_out is None:
+    if args.samples_out is None and args.traces_out is None and not _reported(args):
         raise OptionError("--holes needs --samples-out or --traces-out, or both")
 
 
@@ -117,15 +117,17 @@ def read_holes(args: Namespace, console: Console) -> HoleData | None:
     )
     for line in holes.messages():
         console.warn(line)
-    samples = None if args.samples_out is None else holes.samples(length)
-    if samples is not None:
+    drawn = _reported(args)
+    samples = holes.samples(length) if args.samples_out is not None or drawn else None
+    if samples is not None and args.samples_out is not None:
         check_writable(args.samples_out, samples)
-    return HoleData(
-        holes,
-        length,
-        samples,
-        None if args.traces_out is None else holes.traces(length),
-    )
+    traces = holes.traces(length) if args.traces_out is not None or drawn else None
+    return HoleData(holes, length, samples, traces)
+
+
+def _reported(args: Namespace) -> bool:
+    """Return whether a report draws the holes."""
+    return getattr(args, "report", None) is not None
 
 
 def _length(text: str | None) -> float | None:

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geounfold.backends.blas import one_thread
-from geounfold.errors import BackendError, GeounfoldError
+from geounfold.errors import BackendError, GeounfoldError, OptionError
 from geounfold.geometry import enclosed_volume, tet_volumes
 from geounfold.mesh import Floats, TetMesh, TriMesh
+from geounfold.methods import PointwiseMap, no_mesh
 from geounfold.verification._meshes import border, figures, fill
 from geounfold.verification._options import INTERIORS, MESHERS, CrossCheckOptions
 from geounfold.verification._places import Carrier, Follower
@@ -76,7 +77,7 @@ def crosscheck(
     Raises
     ------
     OptionError
-        Options outside their valid values.
+        Options outside their valid values, or a method that has no control mesh.
 
     Examples
     --------
@@ -117,6 +118,8 @@ class _Run:
     ) -> None:
         self._options, self._progress = options, progress
         self._frame = unfolding.frame
+        if isinstance(unfolding.map, PointwiseMap):
+            raise OptionError(no_mesh(unfolding.options.method, "there is none to cross-check"))
         self._control = unfolding.map.control
         self.surface: TriMesh = border(self._control.folded)
         self._rows = np.flatnonzero(unfolding.carried.inside)

@@ -1,0 +1,18 @@
+"""One self-contained HTML page about an unfolding: verdict, 3-D views, distributions, options.
+
+Takes plain arrays and the dict of the summary, so that it can be written again from files.  The
+page loads nothing from elsewhere and follows the reader's light or dark setting.
+"""
+
+from geounfold.report.page import report_html, write_report
+from geounfold.report.payload import CarriedHoles, CarriedPoints
+from geounfold.report.verdict import Verdict, verdict
+
+__all__ = [
+    "CarriedHoles",
+    "CarriedPoints",
+    "Verdict",
+    "report_html",
+    "verdict",
+    "write_report",
+]

@@ -1,0 +1,185 @@
+"""Distributions as SVG that follows the page's colours: violin, histogram, cumulative curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from geounfold.errors import InputError
+from geounfold.mesh import Floats
+from geounfold.plotting import colour_limits
+from geounfold.report.words import text
+
+_WIDTH, _HEIGHT = 400, 250
+_LEFT, _RIGHT, _TOP, _BOTTOM = 54, 14, 12, 46
+_BINS = 60
+_FINE = 512  # bins that the violin's density is counted in
+_CURVE = 400  # points of the cumulative curve
+_QUANTILES = (0.5, 0.9, 0.95)
+
+
+def distribution(values: Floats, label: str) -> str:
+    """Return violin, histogram and cumulative curve of one column (thesis, figures 3.16 and 4.5).
+
+    Each is an SVG with a text for those who do not see it.
+
+    Parameters
+    ----------
+    values : (n,) float
+        One per block.
+    label : str
+        What they are.
+
+    Raises
+    ------
+    InputError
+        No values, or some that are not finite.
+    """
+    v = np.ravel(np.asarray(values, dtype=np.float64))
+    if not v.size or not np.isfinite(v).all():
+        raise InputError(f"{label}: needs finite values, and at least one")
+    charts = (_violin(v, label), _histogram(v, label), _cumulative(v, label))
+    return f'<div class="charts">{"".join(charts)}</div>'
+
+
+def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
+    """Return round numbers from `low` to `high`, `most` at most, at steps of 1, 2 or 5.
+
+    Examples
+    --------
+    >>> nice_ticks(0.0, 0.093)
+    [0.0, 0.02, 0.04, 0.06, 0.08]
+    """
+    if not high > low:
+        return [low]
+    rough = (high - low) / max(1, most - 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(s * power for s in (1.0, 2.0, 5.0, 10.0) if s * power >= rough * (1 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    digits = max(0, 1 - math.floor(math.log10(step)))
+    return [round(k * step, digits) + 0.0 for k in range(first, last + 1)]
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """Where values of a chart lie in its picture."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    def px(self, value: float) -> float:
+        low, high = self.x
+        return _LEFT + (value - low) / (high - low) * (_WIDTH - _LEFT - _RIGHT)
+
+    def py(self, value: float) -> float:
+        low, high = self.y
+        return _HEIGHT - _BOTTOM - (value - low) / (high - low) * (_HEIGHT - _TOP - _BOTTOM)
+
+    def path(self, x: Floats, y: Floats) -> str:
+        return "L".join(f"{self.px(a):.1f} {self.py(b):.1f}" for a, b in zip(x, y, strict=True))
+
+    def frame(self, xlabel: str, ylabel: str, yticks: Sequence[float]) -> str:
+        """Return grid, ticks and labels."""
+        base, right = _HEIGHT - _BOTTOM, _WIDTH - _RIGHT
+        parts = []
+        for tick in yticks:
+            y = self.py(tick)
+            parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{right}"/>')
+            parts.append(f'<text x="{_LEFT - 6}" y="{y + 4:.1f}" class="end">{_tick(tick)}</text>')
+        for tick in nice_ticks(*self.x):
+            x = self.px(tick)
+            parts.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{base}"/>')
+            parts.append(f'<text x="{x:.1f}" y="{base + 16}" class="mid">{_tick(tick)}</text>')
+        parts.append(f'<path class="axis" d="M{_LEFT} {base}H{right}"/>')
+        middle = (_LEFT + right) / 2
+        parts.append(f'<text x="{middle}" y="{_HEIGHT - 10}" class="mid">{text(xlabel)}</text>')
+        upright = f'transform="translate(12 {(_TOP + base) / 2}) rotate(-90)"'
+        parts.append(f'<text class="mid" {upright}>{text(ylabel)}</text>')
+        return "".join(parts)
+
+
+def _tick(value: float) -> str:
+    if value != 0 and (abs(value) >= 1e6 or abs(value) < 1e-4):
+        return f"{value:.0e}"
+    return f"{value:,.10g}"
+
+
+def _svg(title: str, told: str, content: str) -> str:
+    return (
+        f'<figure class="chart"><svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" '
+        f'aria-label="{text(f"{title}. {told}")}">{content}</svg>'
+        f"<figcaption>{text(told)}</figcaption></figure>"
+    )
+
+
+def _limits(v: Floats) -> tuple[float, float]:
+    """Return the 1st and 99th percentile, with room around; never one and the same."""
+    low, high = colour_limits(v)
+    if v.min() >= 0 and low < 0.25 * high:
+        low = 0.0
+    return low, high
+
+
+def _quartiles(v: Floats) -> str:
+    q1, q2, q3 = np.quantile(v, [0.25, 0.5, 0.75])
+    return f"Median {q2:.4g}, middle half {q1:.4g} to {q3:.4g}"
+
+
+def _violin(v: Floats, label: str) -> str:
+    low, high = _limits(v)
+    counts, edges = np.histogram(np.clip(v, low, high), bins=_FINE, range=(low, high))
+    spread = min(float(v.std()), float(np.subtract(*np.quantile(v, [0.75, 0.25]))) / 1.349)
+    width = 0.9 * spread * len(v) ** -0.2 / (edges[1] - edges[0])  # Silverman's bandwidth
+    density = ndimage.gaussian_filter1d(counts.astype(np.float64), max(width, 1.5), mode="reflect")
+    at = (edges[:-1] + edges[1:]) / 2
+    half = density / density.max()
+    axes = _Axes((low, high), (-1.15, 1.15))
+    outline = axes.path(np.r_[at, at[::-1]], np.r_[half, -half[::-1]])
+    q1, q2, q3 = (axes.px(float(np.clip(q, low, high))) for q in np.quantile(v, [0.25, 0.5, 0.75]))
+    y = axes.py(0.0)
+    content = (
+        axes.frame(label, "density", [])
+        + f'<path class="fill" d="M{outline}Z"/>'
+        + f'<path class="box" d="M{q1:.1f} {y - 7}H{q3:.1f}V{y + 7}H{q1:.1f}Z"/>'
+        + f'<path class="median" d="M{q2:.1f} {y - 14}V{y + 14}"/>'
+    )
+    told = f"Violin: density of the blocks; box the middle half, line the median. {_quartiles(v)}."
+    return _svg(f"Violin of {label}", told, content)
+
+
+def _histogram(v: Floats, label: str) -> str:
+    low, high = _limits(v)
+    counts, edges = np.histogram(np.clip(v, low, high), bins=_BINS, range=(low, high))
+    axes = _Axes((low, high), (0.0, 1.05 * float(counts.max())))
+    base, x = axes.py(0.0), [axes.px(float(edge)) for edge in edges]
+    bars = "".join(
+        f"M{a:.1f} {base:.1f}V{axes.py(float(n)):.1f}H{b:.1f}V{base:.1f}Z"
+        for n, a, b in zip(counts, x[:-1], x[1:], strict=True)
+        if n
+    )
+    content = axes.frame(label, "blocks", nice_ticks(*axes.y, most=5))
+    told = (
+        f"Histogram: {len(v):,} blocks from {v.min():.4g} to {v.max():.4g}; what lies beyond the "
+        "1st and 99th percentile is in the end bars."
+    )
+    return _svg(f"Histogram of {label}", told, f'{content}<path class="bars" d="{bars}"/>')
+
+
+def _cumulative(v: Floats, label: str) -> str:
+    low, high = _limits(v)
+    ordered = np.sort(v)
+    at = np.linspace(low, high, _CURVE)
+    share = np.searchsorted(ordered, at, side="right") / len(v)
+    axes = _Axes((low, high), (0.0, 1.03))
+    content = axes.frame(label, "share of blocks", [0.0, 0.25, 0.5, 0.75, 1.0])
+    content += f'<path class="line" d="M{axes.path(at, share)}"/>'
+    notes = []
+    for q, x in zip(_QUANTILES, np.quantile(v, _QUANTILES), strict=True):
+        place = float(np.clip(x, low, high))
+        content += f'<circle class="dot" r="4" cx="{axes.px(place):.1f}" cy="{axes.py(q):.1f}"/>'
+        notes.append(f"{q:.0%} at or below {x:.4g}")
+    return _svg(f"Cumulative share of {label}", f"Cumulative: {', '.join(notes)}.", content)

@@ -1,0 +1,202 @@
+"""Columns of a report's blocks and samples: told apart by kind, with their limits of colour.
+
+Numbers stay numbers (float32, or 16 bits where there are many columns), texts of few values become
+categories, and a column of one value is kept as that value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from geounfold.mesh import Floats, Ints
+from geounfold.plotting import colour_limits, ratio_limits
+from geounfold.report.arrays import encoded, quantised
+
+MOST_CATEGORIES = 250
+"""Different texts that a column may have to be kept."""
+
+_EXACT = 2**24  # whole numbers that float32 holds
+
+# Column: label, what it means, colour map.
+MEANINGS = {
+    "stratigraphic": ("height in the layer", "0 at the bottom surface, 1 at the top", "viridis"),
+    "nmd_error": (
+        "epsilon(X, Y)",
+        "relative change of the neighbour mean distance, folded X to unfolded Y",
+        "cividis",
+    ),
+    "volume_ratio": (
+        "volume ratio",
+        "volume of the control tetrahedron, unfolded over folded",
+        "diverging",
+    ),
+    "shear": ("shear", "layer-parallel shear, the slip of layers over one another", "cividis"),
+    "stretch_max": ("largest stretch", "largest principal stretch", "diverging"),
+    "stretch_min": ("smallest stretch", "smallest principal stretch", "diverging"),
+    "mesh_distance": (
+        "distance from the control mesh",
+        "0 inside; in the input's unit",
+        "cividis",
+    ),
+    "location": ("location", "inside the control mesh, or extrapolated by its shell", ""),
+    "nmd_folded": (
+        "neighbour mean distance, folded",
+        "mean distance to the neighbours, in the input's unit",
+        "cividis",
+    ),
+    "nmd_unfolded": (
+        "neighbour mean distance, unfolded",
+        "mean distance to the folded body's neighbours, in the input's unit",
+        "cividis",
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One value per block or sample.
+
+    Attributes
+    ----------
+    name, label, meaning : str
+        As in the table; in words, where known; what it is.
+    group : str
+        Which columns it stands with in lists.
+    colours : str
+        Colour map: ``viridis``, ``cividis``, ``diverging``, or empty for categories.
+    values : (n,) float or int
+        NaN, or -1 of categories, where there is no value.
+    categories : tuple of str
+        What the codes mean; empty for numbers.
+    """
+
+    name: str
+    label: str
+    meaning: str
+    group: str
+    colours: str
+    values: Floats | Ints
+    categories: tuple[str, ...] = ()
+
+    def taken(self, rows: Ints) -> Column:
+        """Return the column of some rows."""
+        return replace(self, values=self.values[rows])
+
+    def packed(self, *, short: bool) -> dict[str, Any]:
+        """Return the column for JSON; see `geounfold.report.payload` for the form.
+
+        Parameters
+        ----------
+        short : bool
+            Keep 16 bits of each number: a step of 1/65534 of its range.
+        """
+        facts: dict[str, Any] = {
+            "name": self.name,
+            "label": self.label,
+            "meaning": self.meaning,
+            "group": self.group,
+        }
+        if self.categories:
+            return facts | {
+                "kind": "category",
+                "categories": list(self.categories),
+                **encoded(np.where(self.values < 0, 255, self.values), "u1"),
+            }
+        v = np.asarray(self.values, dtype=np.float64)
+        known = v[np.isfinite(v)]
+        facts |= {"missing": len(v) - len(known)}
+        if not len(known):
+            return facts | {"kind": "empty"}
+        low, high = float(known.min()), float(known.max())
+        facts |= {"kind": "number", "colours": self.colours, "range": [low, high]}
+        if low == high:
+            return facts | {"limits": [low, high], "form": "constant"}
+        return facts | {"limits": list(self._limits(known)), **_numbers(v, low, high, short)}
+
+    def _limits(self, known: Floats) -> tuple[float, float]:
+        """Return the values of the first and last colour."""
+        if self.colours == "diverging":
+            return ratio_limits(known)
+        if self.name == "stratigraphic":
+            return 0.0, 1.0
+        return colour_limits(known)
+
+
+def _numbers(v: Floats, low: float, high: float, short: bool) -> dict[str, Any]:
+    """Return values in the smallest form that tells them apart well enough."""
+    if short:
+        return quantised(v, low, (high - low) / 65534)
+    offset = low if abs(low) > 100 * (high - low) else 0.0
+    whole = max(abs(low - offset), abs(high - offset)) > _EXACT and bool(
+        (np.mod(v[np.isfinite(v)], 1) == 0).all()
+    )
+    return {"offset": offset, **encoded(v - offset, "f8" if whole else "f4")}
+
+
+def read_columns(
+    columns: Mapping[str, ArrayLike], count: int, group: str, known: str = ""
+) -> tuple[list[Column], list[str]]:
+    """Return the columns that a report can hold, and the names of those it cannot.
+
+    Parameters
+    ----------
+    columns : mapping of str to (n,)
+        Numbers, or texts: those that are all numbers, but for blanks, count as numbers.
+    count : int
+        How many values each must have; others are left out.
+    group : str
+        Which columns they stand with in lists.
+    known : str, optional
+        The group of the columns in MEANINGS.
+
+    Examples
+    --------
+    >>> kept, left = read_columns({"cu": ["0.1", "", "0.3"]}, 3, "Input")
+    >>> kept[0].values
+    array([0.1, nan, 0.3])
+    """
+    kept, left = [], []
+    for name, values in columns.items():
+        column = _read(str(name), values, group, known)
+        if column is None or len(column.values) != count:
+            left.append(str(name))
+        else:
+            kept.append(column)
+    return kept, left
+
+
+def _read(name: str, values: ArrayLike, group: str, known: str) -> Column | None:
+    """Return a column of numbers or categories; None where it has too many texts."""
+    label, meaning, colours = MEANINGS.get(name, ("", "", "viridis")) if known else ("", "", "")
+    group = known if known and name in MEANINGS else group
+    series = pd.Series(np.asarray(values).ravel() if not isinstance(values, pd.Series) else values)
+    numbers = _as_numbers(series)
+    if numbers is not None:
+        return Column(name, label, meaning, group, colours or "viridis", numbers)
+    texts = series.astype(object).where(series.notna(), "").astype(str).str.strip()
+    names = sorted(set(texts) - {""})
+    if len(names) > MOST_CATEGORIES or not names:
+        return None
+    codes = pd.Index(names).get_indexer(pd.Index(texts))
+    return Column(name, label, meaning, group, "", codes.astype(np.int64), tuple(names))
+
+
+def _as_numbers(series: pd.Series[Any]) -> Floats | None:
+    """Return a column as floats, NaN where blank or infinite; None where it holds other texts."""
+    if series.dtype.kind in "mMc":
+        return None
+    if series.dtype.kind in "biuf":
+        values = series.to_numpy(dtype=np.float64)
+    else:
+        blank = series.isna() | (series.astype(str).str.strip() == "")
+        values = pd.to_numeric(series.mask(blank), errors="coerce").to_numpy(dtype=np.float64)
+        if np.isnan(values[~blank.to_numpy(dtype=bool)]).any():
+            return None
+    out: Floats = np.where(np.isfinite(values), values, np.nan)
+    return out

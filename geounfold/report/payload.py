@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 GRADIENT_STEP = 1 / 4096
 """What one unit of a gradient's code stands for."""
 
-MOST_POINTS = 40_000
+MOST_POINTS = 20_000
 """Points of traces, and of samples, that a report holds at most."""
 
-_ROOM = 5_000_000  # bytes for the values of columns, before base64
+_ROOM = 3_800_000  # bytes for the values of columns, before base64
 _SAMPLE_COLUMNS = 12
 _SEED = 20_261_125
 _RESULTS = "Results"

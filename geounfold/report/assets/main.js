@@ -174,7 +174,6 @@ class Report {
         Number((high - low).toPrecision(4)))).join(" × ");
       view.root.querySelector(".extent").textContent = `${text} ${this.model.unit || "units"}`;
     });
-    this.byId("row").max = this.model.rows[this.model.count - 1];
   }
 
   setUp(start) {

@@ -14,6 +14,7 @@ ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 SOAK_ARGS ?=
+RUNS ?= 10
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*  ## ' $(MAKEFILE_LIST) | awk -F ':.*  ## ' '{printf "%-12s%s\n", $$1, $$2}'
@@ -66,9 +67,9 @@ bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
 soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
 
-notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each whole
+notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each whole; RUNS: times taken
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py
-	$(BIN)/python -m pytest --nbmake notebooks/*.ipynb $(PYTEST_ARGS)
+	GEOUNFOLD_RUNS=$(RUNS) $(BIN)/python -m pytest --nbmake -n 2 notebooks/*.ipynb $(PYTEST_ARGS)
 
 accept: $(STAMP)  ## score the acceptance bodies, where they are present
 	@if [ -f $(ACCEPTANCE)/score.py ]; then $(BIN)/python $(ACCEPTANCE)/score.py; \

@@ -113,8 +113,8 @@ def flatten(
     method : str
         A name in FLATTENERS.
     start : (n, 2) array, optional
-        Flat positions to start from, mirrored back where they are mirrored; by default
-        Tutte's embedding.
+        Flat positions to start from, mirrored back where they are mirrored; by default the
+        method's own, Tutte's embedding for most.
     rest : (k,) array, optional
         Length that each edge of ``geometry.unique_edges(F)`` should have when flat, in the
         vertices' unit; by default its length in the mesh.  For intrinsic methods alone.

@@ -32,8 +32,17 @@ def factor(matrix: sp.csc_array, ordered: bool = False) -> spl.SuperLU:
 def incidence(edges: Ints, n: int) -> sp.csr_array:
     """Return the signed incidence matrix of edges, (k, n): -1 at the first end, +1 at the other."""
     k = len(edges)
-    rows = np.repeat(np.arange(k), 2)
-    return sp.csr_array((np.tile([-1.0, 1.0], k), (rows, edges.ravel())), shape=(k, n))
+    rows = np.arange(0, 2 * k + 1, 2)
+    return sp.csr_array((np.tile([-1.0, 1.0], k), edges.ravel(), rows), shape=(k, n))
+
+
+def edge_laplacian(edges: Ints, weights: Floats, n: int) -> sp.csc_array:
+    """Return the (n, n) matrix of ``sum w (x_i - x_j)^2`` over the edges, (k, 2), each one once."""
+    i, j = edges.T
+    diagonal = np.bincount(i, weights, n) + np.bincount(j, weights, n)
+    data = np.concatenate([diagonal, -weights, -weights])
+    row, column = np.concatenate([np.arange(n), i, j]), np.concatenate([np.arange(n), j, i])
+    return sp.csc_array((data, (row, column)), shape=(n, n))
 
 
 class PinnedSolver:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from geounfold.flattening._linear import PinnedSolver, incidence
-from geounfold.flattening._problem import Problem, displacement, flip_count
+from geounfold.flattening._linear import PinnedSolver, edge_laplacian, incidence
+from geounfold.flattening._problem import Problem, displacement, edge_of_side, flip_count
 from geounfold.mesh import Floats
 
 
@@ -33,12 +33,15 @@ class RigidSteps:
         cotangent = inner.real / (2 * problem.areas)[:, None]
         ends = np.stack([F[:, first].ravel(), F[:, second].ravel()], axis=1)
         self._difference = incidence(ends, n)
-        transposed = sp.csr_array(self._difference.T)
-        # A column's scale: half the cotangent of its side of its face.
-        transposed.data *= cotangent.ravel()[transposed.indices] / 2
-        self._gather = transposed
+        # Its transpose, each side of each face weighted by half its cotangent.
+        d = self._difference
+        half = cotangent.ravel() / 2
+        weighted = d.data * np.repeat(half, 2)
+        self._gather = sp.csc_array((weighted, d.indices, d.indptr), shape=d.shape[::-1])
         self._pull = cotangent * np.conj(self._side)
-        self.laplacian = PinnedSolver(sp.csc_array(self._gather @ self._difference))
+        edge = edge_of_side(F, problem.edges, n).ravel()
+        weights = np.bincount(edge, half, len(problem.edges)).astype(np.float64)
+        self.laplacian = PinnedSolver(edge_laplacian(problem.edges, weights, n))
 
     def __call__(self, uv: Floats) -> Floats:
         """Return the positions after one step, (n, 2), centred."""

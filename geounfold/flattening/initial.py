@@ -1,4 +1,4 @@
-"""The start of every flattener: what surface can be flattened, and Tutte's embedding of it."""
+"""The start of every flattener: what surface can be flattened, and its first flat positions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from geounfold.backends import igl as backend
 from geounfold.errors import MeshError
-from geounfold.flattening._linear import factor, incidence
+from geounfold.flattening._linear import edge_laplacian, factor
 from geounfold.flattening._problem import Problem, upright
 from geounfold.geometry import lengths, triangle_areas, unique_edges
 from geounfold.mesh import Floats, Ints, TriMesh
@@ -107,14 +107,23 @@ def tutte(problem: Problem) -> Floats:
     total = n + len(problem.loops) - 1
     uv = np.zeros((total, 2))
     uv[outer] = circle(problem, outer)
-    gradient = incidence(edges, total)
-    laplacian = sp.csr_array(gradient.T @ gradient)
+    laplacian = sp.csr_array(edge_laplacian(edges, np.ones(len(edges)), total))
     free = np.ones(total, dtype=bool)
     free[outer] = False
     if free.any():
         rows = laplacian[free]
         uv[free] = factor(sp.csc_array(rows[:, free])).solve(-(rows[:, ~free] @ uv[~free]))
     return upright(uv[:n], problem.mesh.F)
+
+
+def plan(problem: Problem) -> Floats:
+    """Return the vertices on the plane that fits them best, (n, 2), centred.
+
+    Triangles that are turned over in space, as on an overturned limb, are folded over.
+    """
+    centred = problem.mesh.V - problem.mesh.V.mean(axis=0)
+    axes = np.linalg.svd(centred, full_matrices=False)[2]
+    return upright(centred @ axes[:2].T, problem.mesh.F)
 
 
 def circle(problem: Problem, loop: Ints) -> Floats:

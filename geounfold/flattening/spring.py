@@ -14,8 +14,8 @@ from geounfold.errors import BackendError, FlatteningError, OptionError
 from geounfold.flattening._guard import FoldGuard
 from geounfold.flattening._linear import (
     PinnedSolver,
+    edge_laplacian,
     factor,
-    incidence,
     preconditioned_solve,
 )
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
@@ -27,7 +27,7 @@ from geounfold.flattening._springs import (
     spring_energy,
     spring_forces,
 )
-from geounfold.flattening.initial import tutte
+from geounfold.flattening.initial import plan, tutte
 from geounfold.geometry import lengths
 from geounfold.mesh import Floats, Ints
 
@@ -40,15 +40,20 @@ HALVINGS = 30
 #: Newton steps after which folded triangles end a run that has no barrier.
 PATIENCE = 12
 
+#: Edge strain (root mean square) of the projection on a plane up to which it is the start: Tutte's
+#: embedding of a sheet has about as much.
+PLANAR = 0.25
+
 #: Steps of SLIM before the barrier is added, where the start is far from its rest lengths.
 NEARER = 10
 
 #: Residual of a Newton step's equations, as a share of their load: from fine to rough.
 RESIDUAL = (1e-5, 1e-2)
 
-#: Most conjugate gradient steps for which the rigid steps' Laplacian stands in for the Hessian's
-#: factors, which cost about as much as twice that many on 100,000 triangles.
-ROUGH_STEPS = 25
+#: Residual of the first Newton step's equations where the rigid steps' Laplacian stands in for the
+#: Hessian's factors, and most conjugate gradient steps for that: the factors cost as much as about
+#: twice as many on 100,000 triangles.
+ROUGH, ROUGH_STEPS = 1e-2, 25
 
 #: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard where a vertex
 #: and its neighbours lie on one line.
@@ -69,7 +74,7 @@ class SpringOptions:
     max_iter : int
         Largest number of Newton steps.
     warm_strain : float
-        Edge strain (root mean square) of the start above which rigid steps come first.
+        Edge strain (root mean square) of a given start above which rigid steps come first.
     warm_tol : float
         Largest displacement, as a share of the size, at which the rigid steps end.
     warm_max_iter : int
@@ -100,9 +105,9 @@ class SpringOptions:
 def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Flattening:
     """Flatten by minimising ``E = sum C/2 (|P_i P_j| - d_j)^2`` (thesis section 2.2.4).
 
-    A start far from its rest lengths (Tutte's) is first relaxed by a few rigid (ARAP) steps;
-    then Newton's method minimises the springs' energy, with the exact Hessian where that gives
-    a descent, else without the shortened springs' negative parts.  Springs alone may fold a
+    A start of its own, or one far from its rest lengths, is first relaxed by a few rigid (ARAP)
+    steps; then Newton's method minimises the springs' energy, with the exact Hessian where that
+    gives a descent, else without the shortened springs' negative parts.  Springs alone may fold a
     surface over at its minimum, doubly curved ones above all.  Such an answer is redone from
     the last start without flips, brought near its rest lengths by a few steps of SLIM, with a
     barrier against lost triangles added; the note says so.
@@ -112,7 +117,8 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes Tutte's embedding.
+        Flat positions to start from; None takes the projection on the best-fit plane, where no
+        triangle is folded over and lengths are not too far off, else Tutte's embedding.
     options : SpringOptions
         See there.
 
@@ -122,8 +128,9 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
         ``energy`` holds the start's, the relaxed start's (where there was one) and each Newton
         step's energy; with the barrier it includes the barrier's.
     """
-    first = tutte(problem) if start is None else start
-    warm, unfolded, rigid, solver = _warm_start(problem, first, options)
+    first = _own_start(problem) if start is None else start
+    near = 0.0 if start is None else options.warm_strain
+    warm, unfolded, rigid, solver = _warm_start(problem, first, options, near)
     place = solver.place
     system = _System(problem, place, rough=solver.solve if rigid else None)
     history = History.empty(problem)
@@ -155,7 +162,7 @@ def _guarded(
                 f"spring: the springs fold {flips} triangles over, and Tutte's embedding has "
                 "triangles too small to tell from folded ones: remesh the surface"
             )
-        unfolded = _warm_start(problem, unfolded, options)[1]
+        unfolded = _warm_start(problem, unfolded, options, options.warm_strain)[1]
         if unfolded is None:  # Tutte's embedding itself has no flips
             raise FlatteningError("spring: no start without flipped triangles was found")
     unfolded = _nearer(problem, unfolded, options)
@@ -166,13 +173,25 @@ def _guarded(
     return finish(problem, uv, "spring", stop, before + steps, history, note)
 
 
+def _own_start(problem: Problem) -> Floats:
+    """Return the projection on a plane where that is a sound start, else Tutte's embedding."""
+    flat = plan(problem)
+    sound = _strain(problem, flat) <= PLANAR and not flip_count(flat, problem.mesh.F)
+    return flat if sound else tutte(problem)
+
+
+def _strain(problem: Problem, uv: Floats) -> float:
+    """Return the root mean square edge strain."""
+    strain = lengths(uv, problem.edges) / problem.rest - 1
+    return float(np.sqrt(np.mean(strain * strain)))
+
+
 def _nearer(problem: Problem, uv: Floats, options: SpringOptions) -> Floats:
     """Return a start without flips brought near its rest lengths by a few steps of SLIM.
 
     The barrier lets Newton's method creep only, from a start far from its rest lengths.
     """
-    strain = lengths(uv, problem.edges) / problem.rest - 1
-    if not problem.own or np.sqrt(np.mean(strain * strain)) <= options.warm_strain:
+    if not problem.own or _strain(problem, uv) <= options.warm_strain:
         return uv
     try:
         step, after = SlimSteps(problem.mesh.V, problem.mesh.F, uv), uv
@@ -184,15 +203,17 @@ def _nearer(problem: Problem, uv: Floats, options: SpringOptions) -> Floats:
 
 
 def _warm_start(
-    problem: Problem, start: Floats, options: SpringOptions
+    problem: Problem, start: Floats, options: SpringOptions, near: float
 ) -> tuple[Floats, Floats | None, int, PinnedSolver]:
-    """Return the relaxed start, the last one without flips, the steps taken and a Laplacian."""
+    """Return the relaxed start, the last one without flips, the steps taken and a Laplacian.
+
+    A start with an edge strain up to ``near`` stays as it is.
+    """
     F, n = problem.mesh.F, len(problem.mesh.V)
     unfolded = None if flip_count(start, F) else start
-    strain = lengths(start, problem.edges) / problem.rest - 1
-    if np.sqrt(np.mean(strain * strain)) <= options.warm_strain or not options.warm_max_iter:
-        gradient = incidence(problem.edges, n)
-        return start, unfolded, 0, PinnedSolver((gradient.T @ gradient).tocsc())
+    if _strain(problem, start) <= near or not options.warm_max_iter:
+        graph = edge_laplacian(problem.edges, np.ones(len(problem.edges)), n)
+        return start, unfolded, 0, PinnedSolver(graph)
     rigid = RigidSteps(problem)
     uv, flat, steps = relax(rigid, start, problem, options.warm_tol, options.warm_max_iter)
     return uv, flat, steps, rigid.laplacian
@@ -266,7 +287,7 @@ class _System:
         def precondition(x: Floats) -> Floats:
             return pattern.scatter(rough(pattern.gather(x)))
 
-        step = preconditioned_solve(matrix, load, precondition, RESIDUAL[1], ROUGH_STEPS)
+        step = preconditioned_solve(matrix, load, precondition, ROUGH, ROUGH_STEPS)
         return None if step is None else pattern.gather(step)
 
     def _accuracy(self, load: Floats) -> float:

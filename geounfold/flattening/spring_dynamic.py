@@ -14,12 +14,11 @@ from geounfold.flattening._problem import (
     finish,
     flip_count,
     relative_area_error,
-    upright,
 )
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._rigid import RigidSteps, relax
 from geounfold.flattening._springs import spring_energy, spring_forces
-from geounfold.flattening.initial import tutte
+from geounfold.flattening.initial import plan, tutte
 from geounfold.geometry import vertex_sum
 from geounfold.mesh import Floats
 
@@ -138,13 +137,6 @@ def _initial(problem: Problem, options: SpringDynamicOptions) -> Floats:
     if kind == "relaxed":
         return relax(RigidSteps(problem), tutte(problem), problem, 1e-3, 60)[0]
     return plan(problem)
-
-
-def plan(problem: Problem) -> Floats:
-    """Return the vertices on the plane that fits them best, (n, 2); a fold overturned overlaps."""
-    centred = problem.mesh.V - problem.mesh.V.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=False)[2]
-    return upright(centred @ axes[:2].T, problem.mesh.F)
 
 
 class Motion:

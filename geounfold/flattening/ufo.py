@@ -9,12 +9,12 @@ import numpy as np
 from geounfold.errors import FlatteningError, OptionError
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening.initial import plan
 from geounfold.flattening.spring_dynamic import (
     ROUNDING,
     WINDOW,
     Motion,
     SpringDynamicOptions,
-    plan,
 )
 from geounfold.mesh import Floats
 

@@ -131,6 +131,7 @@ def unfold(
         labels = separate_bodies(work, frame)
         own = labels if solid is None else labels[solid.home]
         groups = select_body(P, own, chosen.body)
+        _check_single(groups, chosen)
         parts = [_sorted(work[labels == own[group[0]]]) for group in groups]
         given = frame.to_work(P)
     reference = _reference(top, bottom, frame)
@@ -184,6 +185,14 @@ def _check_method(options: UnfoldOptions) -> None:
         no_mesh(options.method, "nothing is proved of its map")
         + ", or --allow-uncertified to write the answer all the same"
     )
+
+
+def _check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
+    """Raise OptionError where a method without a control mesh is to unfold several bodies."""
+    if len(groups) > 1 and not METHODS[options.method].control:
+        raise OptionError(
+            no_mesh(options.method, "it unfolds one body at a time") + ", or choose one by --body"
+        )
 
 
 def _sorted(points: Floats) -> Floats:
@@ -301,11 +310,6 @@ def _mapping(
     """Return the map of all bodies, without shells where those are in each other's way."""
     rules = [(f.rule, f.points) for f in fits if f.rule is not None and f.points is not None]
     if rules:
-        if len(fits) > 1:
-            raise OptionError(
-                no_mesh(options.method, "it unfolds one body at a time")
-                + ", or choose one by --body"
-            )
         return PointwiseMap(options.method, frame, *rules[0], options.reach)
     reach = METHODS[options.method].reach
     meshes = [(f.control, f.shell) for f in fits if f.control is not None]

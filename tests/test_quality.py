@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import geounfold as gu
 from geounfold.control import ControlMesh
 from geounfold.errors import InputError
 from geounfold.mesh import TetMesh
@@ -15,10 +16,12 @@ from geounfold.quality import (
     Statistics,
     aligned_rms,
     assess,
+    assess_points,
     block_quality,
     compare_with_truth,
     distance_ratios,
     epsilon,
+    neighbour_gradients,
     neighbours,
     nmd,
     random_pairs,
@@ -243,3 +246,73 @@ def test_torn_blocks_are_those_that_part_from_what_they_touch():
 def test_bad_input_is_refused_with_its_reason(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+# ------------------------------------------------------------------- why 13.6 is a matter of units
+
+
+def test_no_answer_of_the_truths_unit_scores_what_the_thesis_prints_for_ufo():
+    # N is the neighbour mean distance of a block in a cloud; |N_W - N_Y| <= |N_W - N_X| +
+    # |N_X - N_Y|, so, divided by N_W,
+    #     epsilon(W, Y) <= epsilon(W, X) + (1 + epsilon(W, X)) epsilon(X, Y),
+    # whatever Y is and whichever neighbours N is taken over.
+    body = gu.simulate("sim_case_1")
+    X, W = body
+    ids = neighbours(W)
+    n_x, n_w = nmd(X, ids), nmd(W, ids)
+    folded = np.abs(n_w - n_x) / n_w
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=X.shape)
+    for Y in (W, X[:, ::-1] * [1, 2, 0.1], X + 4 * noise, 30 * noise, 0 * noise):
+        n_y = nmd(Y, ids)
+        both, answer = np.abs(n_w - n_y) / n_w, np.abs(n_x - n_y) / n_x
+        assert (both <= folded + (1 + folded) * answer + 1e-12).all()
+    # The thesis's table 4.4 has the mean of epsilon(X, Y) as 0.0905 for U-Fo on this body, so that
+    # of epsilon(W, Y) is at most 0.0172 + 1.117 * 0.0905 = 0.118; it prints 13.6475.
+    most = folded.mean() + (1 + folded.max()) * 0.0905
+    assert most == pytest.approx(0.118, abs=0.001)
+    # N is homogeneous: another unit for Y alone, of c to one, gives |1 - c N_Y / N_W|, below 1
+    # for c < 1.  So c - 1 is about 13.6.  An answer as far from X as U-Fo's (0.09), in that unit:
+    Y = X + 3 * noise
+    n_y = nmd(Y, ids)
+    assert (np.abs(n_x - n_y) / n_x).mean() == pytest.approx(0.09, abs=0.005)
+    scale = 14.6475 / (n_y / n_w).mean()
+    assert (np.abs(n_w - scale * n_y) / n_w).mean() == pytest.approx(13.6475, abs=1e-9)
+    # Both of its simulated bodies ask for the same factor, to half a per cent, though their
+    # epsilon(X, Y) differ by a third (0.0905, 0.1225): what a unit does, and an error does not.
+    assert (1 + 13.6475) / (1 + 13.5871) == pytest.approx(1, abs=0.005)
+
+
+def test_neighbour_gradients_are_exact_on_linear_maps():
+    rng = np.random.default_rng(2)
+    X = rng.normal(size=(60, 3))
+    J = np.array([[1.1, 0.2, 0.0], [0.0, 0.9, 0.3], [0.1, 0.0, 1.2]])
+    found = neighbour_gradients(X, X @ J.T + 5, neighbours(X, 12))
+    np.testing.assert_allclose(found, np.broadcast_to(J, found.shape), atol=1e-9)
+
+
+def test_neighbour_gradients_of_a_plane_keep_its_thickness():
+    rng = np.random.default_rng(3)
+    X = np.column_stack([rng.normal(size=(60, 2)), np.zeros(60)])
+    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # a rotation
+    found = neighbour_gradients(X, 2 * X @ turn.T, neighbours(X, 12))
+    # Twice as long in the plane, as thick across, never mirrored: 2 * 2 * 1.
+    np.testing.assert_allclose(np.linalg.det(found), 4, atol=1e-9)
+    np.testing.assert_allclose(found @ [0, 0, 1.0], np.tile(turn[:, 2], (60, 1)), atol=1e-9)
+
+
+def test_points_are_assessed_by_their_neighbours():
+    axes = np.meshgrid(np.arange(8.0), np.arange(7.0), np.arange(5.0), indexing="ij")
+    X = np.stack([a.ravel() for a in axes], axis=1)
+    Y = X * [1.0, 1.0, -2.0]
+    Y[3] = np.nan
+    q = assess_points(X, Y, 3.0, 12)
+    there = np.arange(len(X)) != 3
+    np.testing.assert_allclose(q.blocks.volume_ratio[there], -2, atol=1e-9)
+    assert np.isnan(q.blocks.volume_ratio[3])
+    assert np.isnan(q.blocks.nmd_error[3])
+    # Every block is turned inside out; each had a volume of 3.
+    assert (q.inverted_folded, q.inverted_unfolded) == (0, len(X) - 1)
+    assert q.volume_folded == pytest.approx(3 * (len(X) - 1))
+    assert q.volume_unfolded == pytest.approx(-6 * (len(X) - 1))
+    assert q.edge_change.max == pytest.approx(1)

@@ -146,14 +146,12 @@ def _spread(carried: Carried, rows: Bools) -> Carried:
     if rows.all():
         return carried
     n = len(rows)
-    empty = Carried(
-        np.full((n, 3), np.nan),
-        np.full(n, np.nan),
-        np.zeros(n, bool),
-        np.zeros(n, bool),
-        np.full(n, -1, dtype=np.int64),
-        np.full(n, np.nan),
+    points, share, distance = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    inside, placed = np.zeros(n, bool), np.zeros(n, bool)
+    points[rows], share[rows], distance[rows] = (
+        carried.points,
+        carried.stratigraphic,
+        carried.distance,
     )
-    for name in ("points", "stratigraphic", "inside", "placed", "element", "distance"):
-        getattr(empty, name)[rows] = getattr(carried, name)
-    return empty
+    inside[rows], placed[rows] = carried.inside, carried.placed
+    return Carried(points, share, inside, placed, np.full(n, -1, dtype=np.int64), distance)

@@ -30,7 +30,7 @@ class VolumetricOptions:
         drawn to, against the mean energy.
     """
 
-    max_iter: int = 10
+    max_iter: int = 6
     tol: float = 1e-3
     weight: float = 100.0
 

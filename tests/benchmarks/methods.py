@@ -5,10 +5,9 @@
     python tests/benchmarks/methods.py --show TABLE.csv
 
 The first makes rows (see `geounfold.contest.METHOD_COLUMNS`) and puts them into the table in place
-of those of the same bodies; bodies other than the thesis's two are cut to about N blocks.  The
-second unfolds Unfolding.jl's own body (block_model.csv, samples.csv) by `sheet` and by `isomap`.
-The third prints a table as Markdown: RMS from the truth in blocks, and how many times ours the
-best other method's is.
+of those of the same bodies, whole or cut to about N blocks.  The second unfolds Unfolding.jl's own
+body (block_model.csv, samples.csv) by `sheet` and by `isomap`.  The third prints a table as
+Markdown: RMS from the truth in blocks, and how many times ours the best other method's is.
 """
 
 import argparse
@@ -25,9 +24,7 @@ from geounfold.methods import METHODS
 from geounfold.quality import neighbours
 from geounfold.synthetic import CASES
 
-THESIS = ("sim_case_1", "sim_case_2")
 LARGE = ("large", "thin_wide")
-BLOCKS = 10_000
 NEAR = 16  # neighbours in Unfolding.jl's measure
 OFF = 5.0  # metres: more, and it calls a block bad
 
@@ -40,7 +37,7 @@ def say(text):
 
 def rows(name, blocks):
     """Return one body's rows; None where it has no exact flat image."""
-    body = gu.simulate(name) if name in THESIS else gu.simulate(name, blocks=blocks)
+    body = gu.simulate(name, blocks=blocks)
     if not body.developable:
         return None
     table = compare_methods(body)
@@ -115,7 +112,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", metavar="NAME", nargs="*", help="bodies; all without")
     parser.add_argument("-o", "--output", help="a CSV table to put the rows into")
-    parser.add_argument("--blocks", type=int, default=BLOCKS)
+    parser.add_argument("--blocks", type=int, metavar="N", help="cut bodies to about N")
     parser.add_argument("--peer", type=Path, metavar="FOLDER", help="Unfolding.jl's test data")
     parser.add_argument("--show", metavar="TABLE.csv", help="print a table as Markdown")
     args = parser.parse_args()

@@ -425,6 +425,12 @@ def test_a_body_unfolds_as_well_by_prisms(kind, small):
     assert any(f"{kind} coordinates" in w for w in summary["warnings"])
     assert "not proved" in repr(u)
     assert plain.summary()["coordinates"] == {"name": "tet", "proved": True}
+    # Points around the body go by the shell's prisms, and come back too: a block above it.
+    above = small.folded + np.array([0.0, 0.0, 15.0])
+    there = u.map.carry(above)
+    assert (there.location == "extrapolated").any()
+    back = u.to_folded(there.points[there.placed])
+    assert np.abs(back - above[there.placed]).max() < 1e-11 * size
     # The distortion is the prisms' own: no more one value for all blocks of a tetrahedron.
     assert len(np.unique(u.columns["shear"])) > len(np.unique(plain.columns["shear"]))
 

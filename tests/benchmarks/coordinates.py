@@ -105,9 +105,11 @@ class WedgeMap:
 
     def gradients(self, points, element):
         """Return the deformation gradients at working points (n, 3, 3)."""
-        return self.at(
-            self.reference(points, self.prisms.prism[element]), self.prisms.prism[element]
-        )
+        J = deformation_gradients(self.mapping.whole)[element]
+        prism = self.prisms.prism[element]
+        rows = np.flatnonzero(prism >= 0)
+        J[rows] = self.at(self.reference(points[rows], prism[rows]), prism[rows])
+        return J
 
     def at(self, q, prism):
         """Return the deformation gradients at parameters q (n, 3) of prisms."""
@@ -305,9 +307,9 @@ def main():
             for row in rows:
                 sys.stdout.write(" ".join(f"{k}={_shown(v)}" for k, v in row.items()) + "\n")
             sys.stdout.flush()
-    if args.output:
-        frame = pd.DataFrame(table)
-        frame.to_csv(args.output, index=False, float_format="%.4g", lineterminator="\n")
+            if args.output:  # after every mesh: a run that is cut short leaves what it has
+                frame = pd.DataFrame(table)
+                frame.to_csv(args.output, index=False, float_format="%.4g", lineterminator="\n")
     return 0
 
 

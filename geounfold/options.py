@@ -64,7 +64,8 @@ class UnfoldOptions:
     coordinates : str
         How points go between the control mesh's vertices: by those of the tetrahedron (``tet``),
         which is proved one-to-one, or of the prism, which is smooth inside it but not proved:
-        ``wachspress`` (mean value where a prism is not convex) or ``mvc`` (mean value).
+        ``wachspress`` (mean value where a prism is not convex) or ``mvc`` (mean value).  Blocks
+        that these turn inside out, or do not bring back, are an error.
     neighbours : int
         Neighbours per point in NMD and epsilon.
     reach : float

@@ -40,6 +40,7 @@ class FakeMap:
             stratigraphic=points[:, 2],
             location=np.where(points[:, 0] < 0, words, "inside"),
             distance=np.maximum(-points[:, 0], 0),
+            unsolved=0,
         )
 
 

@@ -76,6 +76,6 @@ accept: $(STAMP)  ## score the acceptance bodies, where they are present
 	else echo "no acceptance bodies at $(ACCEPTANCE): nothing scored"; fi
 
 clean:  ## remove the environment, caches and outputs
-	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	rm -rf $(VENV) demo artefacts build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis \
 	    .import_linter_cache .benchmarks
 	find geounfold tests -name __pycache__ -type d -prune -exec rm -rf {} +

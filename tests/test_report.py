@@ -144,6 +144,51 @@ def test_elements_at_fault_are_listed_with_their_places():
         assert expected in words
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"torn": 3}, "3 blocks torn from a block that it touched"),
+        ({"torn": 1}, "1 block torn"),
+        (
+            {"outside": {"extrapolated": 7, "largest_distance": 12.5}},
+            "7 blocks marked extrapolated",
+        ),
+        ({"outside": {"empty": 2}}, "2 blocks without an image"),
+        ({"nmd": {"mean": 0.05, "p95": 0.2, "max": 0.41}}, "(at most 41%)"),
+        ({"volume_change": {"p95": 0.06}}, "weight by volume_ratio"),
+        ({"flattening": {"mid": {"edge_strain": [0.02]}}}, "change by 2.0%"),
+        ({"flattening": {"top": {"flips": 4, "overlaps": 1}}}, "4 flips and 1 overlaps"),
+        ({"flattening": {"mid": {"stop": "max_iter"}}}, "before it had settled (max_iter)"),
+        ({"method": {"rung": "capped"}}, "Offsets from the mid surface were capped"),
+        ({"method": {"rung": "new"}}, "(rung 'new')"),
+        ({"bodies": 2}, "2 bodies were unfolded one by one"),
+        ({"input": {"dropped_invalid": 5}}, "5 rows of the input left out"),
+        ({"certificate": {"blocks_in_faulty_elements": 8}}, "8 blocks in elements at fault"),
+        (
+            {"drillholes": {"samples": {"points": 9, "extrapolated": 4, "outside": 1}}},
+            "Of 9 points of the drill-holes' samples, 4 lie outside",
+        ),
+        (
+            {"drillholes": {"findings": [{"severity": "warning", "count": 6}]}},
+            "6 rows of the drill-hole tables",
+        ),
+    ],
+)
+def test_the_verdict_names_what_to_distrust_and_nothing_else(change, said):
+    plain = verdict(SOUND).distrust
+    assert len(plain) == 1  # what no proof can tell
+    certificate = {"crossing_folded": 0, "crossing_unfolded": 0} | change.get("certificate", {})
+    change = change | ({"certificate": certificate} if "certificate" in change else {})
+    given = verdict(SOUND | change).distrust
+    assert len(given) == 2
+    assert said in given[0]
+    assert given[1:] == plain
+
+
+def test_torn_blocks_are_no_sound_map():
+    assert verdict(SOUND | {"torn": 2}).level == "care"
+
+
 def test_the_verdict_says_what_the_measure_hides():
     assert any("would score 0" in reason for reason in verdict(SUMMARY).reasons)
 

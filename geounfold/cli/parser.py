@@ -294,7 +294,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT", required=True, help=_POINTS)
     parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
     parser.add_argument("--map", metavar="M.npz", help="the map, for `geounfold map`")
-    parser.add_argument("--report", metavar="R.html", help="figures and pictures")
+    parser.add_argument("--report", metavar="R.html", help="verdict, 3-D views, figures")
     parser.add_argument(
         "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
     )

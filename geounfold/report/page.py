@@ -120,9 +120,9 @@ def report_html(
     title = _title(summary, body.total)
     parts = [
         _verdict_html(verdict(summary), summary.get("warnings", [])),
-        _tiles(summary),
         _section_of_views(viewer.notes, holes),
         folded_up("Still pictures", "\n".join(stills), "stills"),
+        section("Figures", _tiles(summary)),
         section("Distributions over the blocks", "\n".join(_distributions(body.results))),
         section("Elements at fault", _flaws(summary)),
         '<div class="duo">',

@@ -217,18 +217,15 @@ def _strained(flattening: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _holes_to_distrust(holes: Mapping[str, Any]) -> Iterator[str]:
-    for name in ("samples", "traces"):
-        found = mapping(holes.get(name))
-        if found.get("extrapolated"):
-            yield (
-                f"{number(found['extrapolated'])} of {number(found['points'])} points of the "
-                f"drill-holes' {name} lie outside the control mesh; they are marked extrapolated."
-            )
-        if found.get("outside"):
-            yield (
-                f"{number(found['outside'])} of {number(found['points'])} points of the "
-                f"drill-holes' {name} lie beyond the map's reach and have no flat image."
-            )
+    name = "samples" if holes.get("samples") else "traces"
+    found = mapping(holes.get(name))
+    if found.get("extrapolated") or found.get("outside"):
+        yield (
+            f"Of {number(found['points'])} points of the drill-holes' {name}, "
+            f"{number(found.get('extrapolated', 0))} lie outside the control mesh (marked "
+            f"extrapolated) and {number(found.get('outside', 0))} beyond the map's reach (no flat "
+            "image): the farther out, the less they mean."
+        )
     errors = [f for f in _records(holes.get("findings")) if f.get("severity") not in (None, "note")]
     if errors:
         rows = sum(int(f.get("count", 0)) for f in errors)

@@ -130,7 +130,7 @@ function barOf(scale, whole) {
   bar.style.background = `linear-gradient(to right, ${stops.join(",")})`;
   const ticks = element("div", undefined, "ticks");
   const narrow = window.innerWidth < 700;
-  for (const tick of niceTicks(scale.low, scale.high, narrow ? 5 : 9)) {
+  for (const tick of niceTicks(scale.low, scale.high, narrow ? 6 : 9)) {
     const at = (tick - scale.low) / (scale.high - scale.low);
     const mark = element("span", tick.toLocaleString("en", { maximumSignificantDigits: 8 }));
     mark.style.left = `${100 * at}%`;

@@ -40,7 +40,7 @@ function choicesOf(model) {
   const out = [];
   if (height) {
     out.push({
-      ...height, name: "layers", label: `${BANDS} bands of the height in the layer`,
+      ...height, name: "layers", label: `${BANDS} bands of height`,
       group: "Results", bands: BANDS, clipped: false,
     });
     height.clipped = false;

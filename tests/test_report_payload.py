@@ -14,10 +14,10 @@ from geounfold.plotting import block_sides
 from geounfold.quality import NEIGHBOURS, neighbours
 from geounfold.report import CarriedHoles, CarriedPoints
 from geounfold.report.arrays import quantised, quantised_points
-from geounfold.report.blocks import LIMIT, chosen_blocks, gradients, outer_blocks
+from geounfold.report.blocks import LIMIT, block_shape, chosen_blocks, gradients, outer_blocks
 from geounfold.report.charts import distribution, nice_ticks
 from geounfold.report.columns import MOST_CATEGORIES, read_columns
-from geounfold.report.payload import MOST_POINTS, Payload, payload
+from geounfold.report.payload import GRADIENT_STEP, MOST_POINTS, Payload, payload
 from geounfold.report.private import without_folders
 from geounfold.report.words import json_for_script
 
@@ -137,8 +137,38 @@ def test_limits_of_colour_leave_out_outliers_and_ratios_lie_about_one():
 
 
 def test_outer_blocks_of_a_box_are_its_shell():
-    outer = outer_blocks(lattice(9, 7, 5))
-    assert np.count_nonzero(outer) == 9 * 7 * 5 - 7 * 5 * 3  # all but the box within
+    X = lattice(9, 7, 5)
+    turn = np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    for points in (X, 2.5 * X @ turn):
+        outer = outer_blocks(points, block_shape(points, {}))
+        assert np.count_nonzero(outer) == 9 * 7 * 5 - 7 * 5 * 3  # all but the box within
+
+
+def test_boxes_follow_a_turned_lattice():
+    turn = np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    X = (lattice(9, 8, 5) * [4.0, 4.0, 2.0]) @ turn  # rows of turn are the lattice's axes
+    blocks = packed(X, X + 100.0).content["blocks"]
+    np.testing.assert_allclose(blocks["sides"], [4, 4, 2])
+    np.testing.assert_allclose(np.reshape(blocks["axes"], (3, 3)), turn.T, atol=1e-9)
+    F = decoded(blocks["gradients"]).reshape(-1, 3, 3)  # moved, not bent: the axes themselves
+    np.testing.assert_allclose(F, np.broadcast_to(turn.T, F.shape), atol=GRADIENT_STEP)
+
+
+def test_sub_blocks_have_their_own_sizes_and_hide_each_other():
+    # A box of 6 x 6 x 6 units in parents of 2; the parents of one half cut into eight.
+    parents = 2 * lattice(3, 3, 3) + 1.0
+    cut = parents[:, 0] > 4
+    corners = lattice(2, 2, 2) - 0.5
+    X = np.vstack([parents[~cut], (parents[cut, None] + corners).reshape(-1, 3)])
+    size = np.repeat([2.0, 1.0], [18, 72])
+    shape = block_shape(X, {"DIM_X": size, "dim_y": size, "dim_z": [str(s) for s in size]})
+    np.testing.assert_array_equal(shape.sizes, np.column_stack([size] * 3))
+    hidden = X[~outer_blocks(X, shape)]
+    # Within: the middle parent, and sub-blocks that no side of the box touches (x of 4 to 5).
+    assert np.count_nonzero(~outer_blocks(X, shape)) == 1 + 4 * 4
+    assert hidden.min() > 1
+    assert hidden.max() < 5
+    assert block_shape(X, {"dim_x": size, "dim_y": size, "dim_z": 0 * size}) is None
 
 
 def test_samples_prefer_the_outside_and_keep_some_inside():

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import ndimage
 
+from geounfold.lattice import measure_lattice, point_spacing
 from geounfold.mesh import Bools, Floats, Ints
-from geounfold.plotting import block_sides, level_step
+from geounfold.plotting import block_sides
+from geounfold.report.columns import read_columns
 
 LIMIT = 50_000
 """Blocks that a report holds at most."""
@@ -15,16 +21,79 @@ _SEED = 20_261_124
 _MAX_CELLS = 30_000_000  # of the grid that inner blocks are found with: 30 MB
 _INSIDE_SHARE = 0.2  # of the blocks drawn at least, so that slices of large bodies are not empty
 _LOOSE = 0.001  # how much a gradient is held to a rotation, which sheets of one block need
+_SIDES = ("dim_x", "dim_y", "dim_z")
+_SPARSE = 1.3  # typical spacing over the lattice's step from which blocks are larger than steps
+_FINEST = 8  # sub-blocks along a side that are told apart
 _TORN = 2.5  # neighbours that move apart by this factor are none
 
 
-def outer_blocks(points: Floats) -> Bools:
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """The boxes that blocks are drawn as, in the folded space.
+
+    Attributes
+    ----------
+    axes : (3, 3) float
+        Unit directions of the boxes' edges, as rows.
+    sides : (3,) float
+        Their lengths along these, where blocks are alike; else of the smallest.
+    sizes : (n, 3) float or None
+        Every block's lengths, where they differ.
+    """
+
+    axes: Floats
+    sides: Floats
+    sizes: Floats | None = None
+
+
+def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | None:
+    """Return how blocks lie in the folded space; None of points that are on no lattice.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Centroids.
+    columns : mapping of str to (n,)
+        Where they hold ``dim_x``, ``dim_y``, ``dim_z`` (in any letter case), all above 0, these are
+        the blocks' sides along the lattice's axes.
+
+    Examples
+    --------
+    >>> cube = np.stack(np.meshgrid(*[np.arange(4.0)] * 3), -1).reshape(-1, 3)
+    >>> block_shape(5 * cube, {}).sides
+    array([5., 5., 5.])
+    """
+    found = measure_lattice(points)
+    axes = np.eye(3) if found is None else found.axes
+    sizes = _sizes(columns, len(points))
+    if sizes is not None:
+        return Shape(axes, sizes.min(axis=0), sizes if np.ptp(sizes, axis=0).any() else None)
+    if found is not None and point_spacing(points) < _SPARSE * found.steps.max():
+        return Shape(axes, found.steps)
+    return None
+
+
+def _sizes(columns: Mapping[str, ArrayLike], count: int) -> Floats | None:
+    """Return the sides of blocks that stand in a table, (n, 3); None where they do not."""
+    known = {str(name).lower(): values for name, values in columns.items()}
+    if not all(name in known for name in _SIDES):
+        return None
+    read, _ = read_columns({name: known[name] for name in _SIDES}, count, "")
+    if len(read) < 3 or any(column.categories for column in read):
+        return None
+    sizes = np.column_stack([column.values for column in read]).astype(np.float64)
+    return sizes if bool((sizes > 0).all()) else None
+
+
+def outer_blocks(points: Floats, shape: Shape | None) -> Bools:
     """Return which blocks can be seen from outside: all but those with blocks on every side.
 
     Parameters
     ----------
     points : (n, 3) float
-        Centroids in the space where they may form a lattice.
+        Centroids in the folded space.
+    shape : Shape or None
+        See `block_shape`.
 
     Returns
     -------
@@ -35,27 +104,39 @@ def outer_blocks(points: Floats) -> Bools:
     Examples
     --------
     >>> cube = np.stack(np.meshgrid(*[np.arange(3.0)] * 3), -1).reshape(-1, 3)
-    >>> np.flatnonzero(~outer_blocks(cube))
+    >>> np.flatnonzero(~outer_blocks(cube, Shape(np.eye(3), np.ones(3))))
     array([13])
     """
-    sides = block_sides(points)
-    cell = np.floor((points - points.min(axis=0)) / sides + 0.5).astype(np.int64) + 3
-    shape = cell.max(axis=0) + 4
-    if shape.prod() > _MAX_CELLS:
+    cells, owner = _cells(points, shape)
+    extent = cells.max(axis=0) + 4
+    if extent.prod() > _MAX_CELLS:
         return np.ones(len(points), dtype=np.bool_)
-    full = np.zeros(shape, dtype=np.bool_)
-    full[tuple(cell.T)] = True
-    lattice = on_lattice(points)
-    if not lattice:
+    full = np.zeros(extent, dtype=np.bool_)
+    full[tuple(cells.T)] = True
+    if shape is None:
         full = ndimage.binary_closing(full, np.ones((3, 3, 3), dtype=np.bool_))
-    inside = ndimage.binary_erosion(full, iterations=1 if lattice else 2)
-    outer: Bools = ~inside[tuple(cell.T)]
+    inside = ndimage.binary_erosion(full, iterations=2 if shape is None else 1)
+    outer: Bools = np.zeros(len(points), dtype=np.bool_)
+    outer[owner[~inside[tuple(cells.T)]]] = True
     return outer
 
 
-def on_lattice(points: Floats) -> bool:
-    """Return whether the coordinates along every axis are levels at equal steps."""
-    return len(points) > 1 and all(level_step(column) is not None for column in points.T)
+def _cells(points: Floats, shape: Shape | None) -> tuple[Ints, Ints]:
+    """Return the cells that blocks fill, (m, 3), none below 3, and the block that fills each."""
+    axes, sides = (np.eye(3), block_sides(points)) if shape is None else (shape.axes, shape.sides)
+    sizes = sides if shape is None or shape.sizes is None else shape.sizes
+    corner = points @ axes.T - sizes / 2
+    first = np.rint((corner - corner.min(axis=0)) / sides).astype(np.int64) + 3
+    counts = np.maximum(np.rint(np.broadcast_to(sizes / sides, first.shape)), 1).astype(np.int64)
+    counts = np.minimum(counts, _FINEST)
+    cells, owner = [], []
+    kinds, kind = np.unique(counts, axis=0, return_inverse=True)
+    for number, many in enumerate(kinds):
+        rows = np.flatnonzero(kind.ravel() == number)
+        inner = np.stack(np.meshgrid(*map(np.arange, many), indexing="ij"), -1).reshape(-1, 3)
+        cells.append((first[rows, None] + inner).reshape(-1, 3))
+        owner.append(np.repeat(rows, len(inner)))
+    return np.concatenate(cells), np.concatenate(owner)
 
 
 def chosen_blocks(outer: Bools, limit: int = LIMIT) -> Ints:

@@ -1,8 +1,9 @@
 """What the viewer draws, as one JSON object of quantised arrays.
 
-Form: ``blocks`` holds the places in both spaces (16 bits per coordinate), the sides of a block in
-the space where it is drawn as a box (the folded one on lattices, else the unfolded one), its
-gradients to the other, ``bent`` one (16 bits per entry, GRADIENT_STEP each), which blocks lie
+Form: ``blocks`` holds the places in both spaces (16 bits per coordinate), the sides of a block (of
+every one, ``sizes``, where they differ) and the axes along which they lie (as columns) in the space
+where it is drawn as a box (the folded one on lattices, else the unfolded one), the gradients times
+these axes for the other, ``bent`` one (16 bits per entry, GRADIENT_STEP each), which blocks lie
 outside, and the rows they come from; ``columns`` their values; ``holes`` traces and samples in
 float32; ``palettes`` the colour maps, 256 colours of three bytes each.
 """
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike
 from geounfold.mesh import Floats, Ints
 from geounfold.plotting import ViewOptions, block_sides, require
 from geounfold.report.arrays import encoded, floating_points, quantised_points
-from geounfold.report.blocks import chosen_blocks, gradients, on_lattice, outer_blocks
+from geounfold.report.blocks import block_shape, chosen_blocks, gradients, outer_blocks
 from geounfold.report.columns import Column, read_columns
 
 if TYPE_CHECKING:
@@ -136,7 +137,8 @@ def payload(
         Blocks of the body, those without an image included.
     """
     view = view or ViewOptions()
-    outer = outer_blocks(folded)
+    form = block_shape(folded, columns)
+    outer = outer_blocks(folded, form)
     chosen = chosen_blocks(outer)
     notes = []
     shown, drawn = int(np.count_nonzero(outer)), int(np.count_nonzero(outer[chosen]))
@@ -153,18 +155,18 @@ def payload(
         notes.append(f"{total - len(folded):,} blocks without an image are not drawn.")
     read, left = read_columns(columns, len(folded), _INPUT, _RESULTS)
     read.sort(key=lambda column: column.group != _RESULTS)
-    packed, form, dropped = _packed([column.taken(chosen) for column in read], len(chosen))
+    packed, coarse, dropped = _packed([column.taken(chosen) for column in read], len(chosen))
     left += dropped
     if left:
         notes.append(
             f"Columns left out, for want of room or as texts of too many kinds: {', '.join(left)}."
         )
-    if form:
-        notes.append(form)
+    if coarse:
+        notes.append(coarse)
     carried, told = _holes(holes, folded.min(axis=0), unfolded.min(axis=0))
-    lattice = on_lattice(folded)
-    straight, bent = (folded, unfolded) if lattice else (unfolded, folded)
-    shape = (
+    straight, bent = (unfolded, folded) if form is None else (folded, unfolded)
+    axes = np.eye(3) if form is None else form.axes
+    turned = (
         np.broadcast_to(np.eye(3), (len(chosen), 3, 3))
         if neighbours is None
         else gradients(straight, bent, neighbours, chosen)
@@ -177,12 +179,14 @@ def payload(
             "unfolded": quantised_points(unfolded[chosen]),
             "gradients": {
                 "step": GRADIENT_STEP,
-                **encoded(
-                    np.clip(np.rint(shape.reshape(-1, 9) / GRADIENT_STEP), -32767, 32767), "i2"
-                ),
+                **encoded(_gradient_codes(turned @ axes.T), "i2"),
             },
-            "sides": block_sides(straight).tolist(),
-            "bent": "unfolded" if lattice else "folded",
+            "sides": (block_sides(unfolded) if form is None else form.sides).tolist(),
+            "sizes": None
+            if form is None or form.sizes is None
+            else quantised_points(form.sizes[chosen]),
+            "axes": axes.T.ravel().tolist(),
+            "bent": "folded" if form is None else "unfolded",
             "grow": math.sqrt(shown / drawn),
             "outer": encoded(outer[chosen], "u1"),
         },
@@ -195,6 +199,11 @@ def payload(
         "start": _start(packed),
     }
     return Payload(content, (*notes, *told))
+
+
+def _gradient_codes(matrices: Floats) -> Floats:
+    """Return matrices (k, 3, 3) as whole multiples of GRADIENT_STEP, row by row, (k, 9)."""
+    return np.clip(np.rint(matrices.reshape(-1, 9) / GRADIENT_STEP), -32767, 32767)
 
 
 def _start(packed: list[dict[str, Any]]) -> str:

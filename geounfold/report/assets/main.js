@@ -19,7 +19,8 @@ function readModel(data) {
     count: blocks.count, rows: arrayOf(blocks.rows), outer: arrayOf(blocks.outer),
     folded: pointsOf(blocks.folded), unfolded: pointsOf(blocks.unfolded),
     gradients: arrayOf(blocks.gradients), gradientStep: blocks.gradients.step, bent: blocks.bent,
-    sides: blocks.sides.map((s) => s * blocks.grow), unit: data.unit,
+    sides: blocks.sides, sizes: blocks.sizes && pointsOf(blocks.sizes), axes: blocks.axes,
+    grow: blocks.grow, unit: data.unit,
     columns: data.columns.map(columnOf), samples: null, traces: null,
   };
   for (const name of ["traces", "samples"]) {
@@ -99,7 +100,7 @@ function bodyOf(model, space, start) {
     places, extents, centre, seen, size, sides: model.sides, unit: model.gradientStep,
     unit_name: model.unit, gradients: space === model.bent ? model.gradients : null,
     segments: model.traces ? segmentsOf(model.traces, space, centre) : null,
-    samples: null,
+    samples: null, sizes: model.sizes, axes: model.axes, grow: model.grow,
   };
   if (model.samples) {
     body.samples = new Float32Array(3 * model.samples.count);

@@ -13,17 +13,21 @@ vec4 seen(vec3 place) {
 const BLOCK_VERTEX = `${COMMON}
 layout(location=0) in vec3 corner; layout(location=1) in vec2 side;
 layout(location=2) in uint block;
-uniform usampler2D places; uniform isampler2D gradients; uniform sampler2D shades;
-uniform vec3 origin, spacing, sides; uniform float unit; uniform bool bent;
+uniform usampler2D places, sizes; uniform isampler2D gradients; uniform sampler2D shades;
+uniform vec3 origin, spacing, sides, smallest, sizing; uniform float unit, grow;
+uniform bool bent, sized; uniform mat3 axes;
 out vec2 across; out vec3 eye; flat out float shade; flat out uint id;
 ivec2 texel(uint k) { return ivec2(int(k) % ${WIDE}, int(k) / ${WIDE}); }
 void main() {
-  vec3 d = corner * sides;
+  vec3 d = corner * grow * (sized
+    ? smallest + sizing * vec3(texelFetch(sizes, texel(block), 0).xyz) : sides);
   if (bent) {
     vec3 row0 = vec3(texelFetch(gradients, texel(3u * block), 0).xyz);
     vec3 row1 = vec3(texelFetch(gradients, texel(3u * block + 1u), 0).xyz);
     vec3 row2 = vec3(texelFetch(gradients, texel(3u * block + 2u), 0).xyz);
     d = unit * vec3(dot(row0, d), dot(row1, d), dot(row2, d));
+  } else {
+    d = axes * d;
   }
   vec3 place = origin + spacing * vec3(texelFetch(places, texel(block), 0).xyz) + d;
   across = side; shade = texelFetch(shades, texel(block), 0).x; id = block + 1u;
@@ -195,6 +199,9 @@ class Renderer {
     this.gradients = this.texture();
     this.fill(this.gradients, body.gradients || new Int16Array(3), 3, Int16Array, gl.RGBA16I,
       gl.RGBA_INTEGER, gl.SHORT);
+    this.sizes = this.texture();
+    this.fill(this.sizes, body.sizes ? body.sizes.values : new Uint16Array(3), 3, Uint16Array,
+      gl.RGBA16UI, gl.RGBA_INTEGER, gl.UNSIGNED_SHORT);
     this.boxes = gl.createVertexArray();
     gl.bindVertexArray(this.boxes);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -334,18 +341,27 @@ class Renderer {
     const gl = this.gl, program = this.blockProgram, body = this.body;
     this.useCamera(program, camera, size);
     gl.enable(gl.CULL_FACE);
-    [this.places, this.gradients, this.shades, this.table].forEach((texture, unit) => {
+    const textures = [this.places, this.gradients, this.shades, this.table, this.sizes];
+    textures.forEach((texture, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
     });
     gl.activeTexture(gl.TEXTURE0);
-    ["places", "gradients", "shades", "table"].forEach((name, unit) => {
+    ["places", "gradients", "shades", "table", "sizes"].forEach((name, unit) => {
       gl.uniform1i(program.uniform(name), unit);
     });
     const grow = how.grow || 1;
     gl.uniform3f(program.uniform("origin"), ...body.places.offset.map((x, a) => x - body.centre[a]));
     gl.uniform3f(program.uniform("spacing"), ...body.places.step);
-    gl.uniform3f(program.uniform("sides"), ...body.sides.map((s) => s * grow));
+    gl.uniform3f(program.uniform("sides"), ...body.sides);
+    gl.uniform1f(program.uniform("grow"), grow * body.grow);
+    gl.uniform1i(program.uniform("sized"), body.sizes ? 1 : 0);
+    if (body.sizes) {
+      gl.uniform3f(program.uniform("smallest"), ...body.sizes.offset);
+      gl.uniform3f(program.uniform("sizing"), ...body.sizes.step);
+    }
+    // Axes stand as columns, row by row: WebGL takes columns one after the other.
+    gl.uniformMatrix3fv(program.uniform("axes"), true, body.axes);
     gl.uniform1f(program.uniform("unit"), body.unit);
     gl.uniform1i(program.uniform("bent"), body.gradients ? 1 : 0);
     gl.uniform1i(program.uniform("mode"), how.mode);

@@ -28,7 +28,7 @@ from geounfold.mesh import TetMesh
 from geounfold.report import CarriedHoles, CarriedPoints
 
 COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
-COMMANDS += ["init", "doctor", "completion"]
+COMMANDS += ["crosscheck", "init", "doctor", "completion"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
 PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
 RESULTS = [*PLACE, "location", "mesh_distance"]

@@ -189,6 +189,21 @@ def test_torn_blocks_are_no_sound_map():
     assert verdict(SOUND | {"torn": 2}).level == "care"
 
 
+@needs_rendering
+def test_a_cross_check_of_meshes_is_told_where_there_was_one():
+    meshes = [
+        {"mesh": "prism", "volume_difference": 0.0, "error": ""},
+        {"mesh": "tetwild", "volume_difference": None, "error": "took longer than 600 s"},
+    ]
+    places = [{"mesh": "prism", "interior": "harmonic", "rms": 0.0625, "worst": [1, 2, 3]}]
+    summary = SOUND | {"crosscheck": {"meshes": meshes, "places": places}}
+    words = " ".join(Page(report_html(summary, SLAB[:8], SLAB[:8], {}, view=SMALL)).words)
+    for expected in ("Cross-check of meshes", "took longer than 600 s", "harmonic", "0.0625"):
+        assert expected in words
+    without = " ".join(Page(report_html(SOUND, SLAB[:8], SLAB[:8], {}, view=SMALL)).words)
+    assert "Cross-check of meshes" not in without
+
+
 def test_the_verdict_says_what_the_measure_hides():
     assert any("would score 0" in reason for reason in verdict(SUMMARY).reasons)
 

@@ -88,6 +88,10 @@ def unfold(args: Namespace, console: Console) -> None:
 
     result = pipeline.unfold(table.points, options, progress=console.stage, **surfaces)
     summary = {**result.summary(), "input": table.facts(), "command": _command(args)}
+    if args.crosscheck:
+        from geounfold.verification import crosscheck as check_meshes
+
+        summary = check_meshes(result, progress=console.stage).added_to(summary)
     warnings = summary.get("warnings", [])
     if samples is not None:
         summary["samples"] = samples.facts()
@@ -317,6 +321,49 @@ def _truth(args: Namespace, count: int, console: Console) -> Floats:
             "together one by one"
         )
     return truth.points
+
+
+def crosscheck(args: Namespace, console: Console) -> None:
+    """Unfold a body and check its control mesh against other meshes of the same border."""
+    outputs = Outputs.planned(
+        {
+            "--output": (args.output, (*TABLE_ENDINGS, *_JSON)),
+            "--differences": (args.differences, _POINTS_OUT),
+        },
+        _given(args.points, _config(args)),
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    table = _read(args.points, args, console)
+    if args.differences is not None:
+        table.check_writable(args.differences)
+    from geounfold import pipeline, verification
+    from geounfold.cli.figures import crosscheck_lines
+
+    given = {"meshers": args.meshers, "interiors": args.interiors}
+    named: dict[str, Any] = {
+        name: tuple(word.strip() for word in words.split(","))
+        for name, words in given.items()
+        if words is not None
+    }
+    chosen = verification.CrossCheckOptions(**named)
+    result = pipeline.unfold(table.points, _options(args), progress=console.stage)
+    check = verification.crosscheck(result, chosen, progress=console.stage)
+    facts = {**check.as_dict(), "input": table.facts(), "command": _command(args)}
+    console.stage("writing")
+    with outputs.writing() as parts:
+        if "--differences" in parts:
+            columns = {f"difference_{name}": v for name, v in check.differences.items()}
+            table.write(parts["--differences"], columns)
+        if "--output" in parts and ending(Path(args.output)) in _JSON:
+            write_json(parts["--output"], facts)
+        elif "--output" in parts:
+            write_table(parts["--output"], check.table)
+    for warning in [*result.summary()["warnings"], *check.warnings]:
+        console.warn(warning)
+    console.done(f"{len(check.meshes) - 1} meshes compared")
+    quiet = args.output is not None
+    console.answer(facts, None if quiet else lambda: "".join(crosscheck_lines(check)))
 
 
 def _refuse_model_options(args: Namespace) -> None:

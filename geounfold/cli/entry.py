@@ -28,6 +28,7 @@ _COMMANDS = {
     "unfold": "unfold",
     "map": "carry",
     "compare": "compare",
+    "crosscheck": "crosscheck",
     "quality": "quality",
     "simulate": "simulate",
     "view": "view",

@@ -89,6 +89,23 @@ columns:
                      image, and past the surfaces' border
   area_error ... overlaps                          as above, of the mid surface (else the top)
   iterations, seconds, cpu_seconds, note, error    how it went"""
+_CROSSCHECK = """\
+rows: the control mesh of prisms and, by each mesher, another mesh of its border; each with its
+border laid flat by our map and its inside following it (harmonic, or arap: as rigid as possible)
+columns: lengths in blocks, volumes in the input's unit
+  volume, volume_difference            of the mesh; against that inside the control mesh's border
+  hausdorff_to, hausdorff_from         largest distance between the borders, both ways
+  dihedral_..., radius_ratio_...       shape of the tetrahedra: degrees; 1 regular, 0 flat
+  rms, p95, max                        distance of the blocks' flat places from the map's
+  along_layers, across_layers          rms of its horizontal and vertical part
+  worst_x, worst_y, worst_z            where the largest is, folded
+  rms_same_interior                    what is left against the control mesh with the same inside
+  outside, inverted_unfolded           blocks that the mesh does not hold; tetrahedra turned over
+  error                                why there are no figures; empty where it worked
+
+Warnings go to stderr: volumes that differ by more than 1 %, borders by more than 0.5 blocks, places
+by more than 0.25 blocks RMS. tetwild draws random numbers that cannot be seeded: its figures repeat
+to about three digits, not bit for bit. tetgen (AGPL) needs: pip install 'geounfold[tetgen]'"""
 _QUALITY = """\
 figures: mean, standard deviation, 95th percentile and maximum, or one number each
   nmd_folded, nmd_unfolded, nmd_truth   mean distance to the neighbours, in the unit of the file
@@ -171,6 +188,7 @@ def build_parser(*, holes: bool = False) -> Parser:
     _add_unfold(commands, common)
     _add_map(commands, common, holes=holes)
     _add_compare(commands, common)
+    _add_crosscheck(commands, common)
     _add_quality(commands, common)
     _add_simulate(commands, common)
     _add_view(commands, common)
@@ -307,6 +325,11 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
         "--top", metavar="T", help="the top surface: a mesh file or a table (see below)"
     )
     parser.add_argument("--bottom", metavar="B", help="the bottom surface")
+    parser.add_argument(
+        "--crosscheck",
+        action="store_true",
+        help="check the control mesh against others of its border, in summary and report",
+    )
     _add_columns(parser)
     _add_holes(parser)
     _add_model(parser).add_argument(
@@ -403,6 +426,27 @@ def _add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument("--truth-columns", metavar="A,B,C", help="coordinate columns of W")
     _add_columns(parser)
     _add_model(parser, "how a body's surfaces are found")
+
+
+def _add_crosscheck(commands: Any, common: argparse.ArgumentParser) -> None:
+    summary = "check an unfolding's control mesh against other meshes of its border"
+    parser = _add_command(commands, "crosscheck", summary, common, _CROSSCHECK)
+    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_POINTS}")
+    parser.add_argument(
+        "-o", "--output", metavar="TABLE", help=f"{_TABLES}, or .json; without, it goes to stdout"
+    )
+    parser.add_argument(
+        "--differences",
+        metavar="D",
+        help="POINTS with a column difference_MESHER_INSIDE for each way, in blocks: "
+        f"{_TABLES}, or another format",
+    )
+    parser.add_argument(
+        "--meshers", metavar="A,B", help="tetwild, tetgen (default: tetwild, and tetgen if there)"
+    )
+    parser.add_argument("--interiors", metavar="A,B", help="harmonic, arap (default both)")
+    _add_columns(parser)
+    _add_model(parser, "how the body is unfolded")
 
 
 def _add_quality(commands: Any, common: argparse.ArgumentParser) -> None:

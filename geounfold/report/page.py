@@ -125,6 +125,7 @@ def report_html(
         section("Figures", _tiles(summary)),
         section("Distributions over the blocks", "\n".join(_distributions(body.results))),
         section("Elements at fault", _flaws(summary)),
+        section("Cross-check of meshes", _crosscheck(summary)),
         '<div class="duo">',
         section("Certificate", _certificate(summary)),
         section("How it was made", pairs(_making(summary))),
@@ -312,6 +313,28 @@ def _flaws(summary: Mapping[str, Any]) -> str:
         for flaw in flaws
     ]
     return table(rows) if rows else ""
+
+
+def _crosscheck(summary: Mapping[str, Any]) -> str:
+    """Return other meshes of the control mesh's border, and where they place the blocks."""
+    found = mapping(summary.get("crosscheck"))
+    meshes, places = (
+        [_told(row, left_out) for row in found.get(key) or []]
+        for key, left_out in (("meshes", ("boundary_volume",)), ("places", ("worst", "seconds")))
+    )
+    tables = table(meshes) + table(places)
+    words = (
+        "The control mesh of prisms against other meshes of its border; lengths in blocks. Where "
+        "the border alone follows the map and the inside is harmonic or as rigid as possible, "
+        "blocks lie rms, p95 and max from where the map places them, and rms_same_interior from "
+        "where the control mesh with such an inside does."
+    )
+    return f'<p class="soft">{words}</p>\n{tables}' if tables else ""
+
+
+def _told(row: Mapping[str, Any], left_out: tuple[str, ...]) -> dict[str, Any]:
+    """Return a row without columns that say nothing."""
+    return {k: v for k, v in row.items() if k not in left_out and v is not None and v != ""}
 
 
 def _drillholes(summary: Mapping[str, Any]) -> str:

@@ -2,7 +2,8 @@
 
 What such a call does to its process (a crash, a full memory, text on stdout) ends with that
 process and comes back as one BackendError.  Each call has a fresh process, so that what a library
-keeps between calls cannot change the answer.
+keeps between calls cannot change the answer, and a folder of its own to work in, which goes with it:
+fTetWild leaves a file where it runs.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -102,8 +104,9 @@ def _answer(source: BinaryIO, target: BinaryIO) -> None:
 
 
 def _search_path() -> str:
-    """Return PYTHONPATH with the folder that this very package was loaded from in front."""
-    return os.pathsep.join(filter(None, [_ROOT, os.environ.get("PYTHONPATH")]))
+    """Return PYTHONPATH, absolute, with the folder that this very package came from in front."""
+    given = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    return os.pathsep.join([_ROOT, *(os.path.abspath(path) for path in given if path)])
 
 
 def _end(code: int, stderr: bytes) -> str:

@@ -74,12 +74,12 @@ def draw_cuts(meshes: Mapping[str, TetMesh], axis: int, at: float) -> Figure:
         The plane cuts nothing.
     """
     figure: Figure = require("matplotlib.figure").Figure(
-        figsize=(12.5, 0.4 + 3.4 * len(meshes)), dpi=100, layout="constrained"
+        figsize=(12.5, 5.5), dpi=100, layout="constrained"
     )
     collection = require("matplotlib.collections").PolyCollection
     colours: dict[str, Any] = {"cmap": "cividis", "clim": (0.0, 1.0)}
     names = [name for k, name in enumerate("xyz") if k != axis]
-    axes = np.ravel(figure.subplots(len(meshes), 1, sharex=True, squeeze=False))
+    axes = np.ravel(figure.subplots(1, len(meshes), sharey=True, squeeze=False))
     for ax, (title, mesh) in zip(axes, meshes.items(), strict=True):
         polygons, element = cut_polygons(mesh, axis, at)
         if not len(element):
@@ -96,8 +96,8 @@ def draw_cuts(meshes: Mapping[str, TetMesh], axis: int, at: float) -> Figure:
         )
         ax.autoscale_view()
         ax.set_aspect("equal")
-        ax.set(title=f"{title}, cut at {'xyz'[axis]} = {at:g}", ylabel=names[1])
-    axes[-1].set_xlabel(names[0])
+        ax.set(title=f"{title}, cut at {'xyz'[axis]} = {at:g}", xlabel=names[0])
+    axes[0].set_ylabel(names[1])
     figure.colorbar(
         axes[0].collections[0], ax=list(axes), label="radius ratio (1 regular, 0 flat)", shrink=0.6
     )

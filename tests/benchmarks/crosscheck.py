@@ -1,6 +1,6 @@
 """Table of the cross-check of meshes over the public bodies.
 
-    python tests/benchmarks/crosscheck.py [NAME ...] [-o TABLE.csv] [--shared ../shared]
+    python tests/benchmarks/crosscheck.py [NAME ...] [-o TABLE.csv] [--blocks N]
 
 Each body is unfolded, and its control mesh checked against fTetWild's and TetGen's of the same
 border; lengths are in blocks.  Columns are those of `geounfold crosscheck`, a few left out, and
@@ -27,17 +27,15 @@ from geounfold.io import read_points
 from geounfold.synthetic import CASES
 
 TRUE = ("true_x", "true_y", "true_z")
-BLOCKS = {"large": 30_000}
-FOLDED_TWICE = ("refolded", "refolded_tight")
 LEFT_OUT = ["boundary_volume", "worst_x", "worst_y", "worst_z"]
 
 
-def load(name, shared):
+def load(name, shared, blocks):
     """Return folded points, truth or None, and whether the body is developable."""
     kind, _, case = name.rpartition("/")
     if not kind:
-        body = gu.simulate(case, blocks=BLOCKS.get(case))
-        return body.folded, body.truth, case not in FOLDED_TWICE
+        body = gu.simulate(case, blocks=blocks)
+        return body.folded, body.truth, body.developable
     folder = shared / "acceptance" / "cases"
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
     path = folder / f"{case}.csv"
@@ -47,9 +45,9 @@ def load(name, shared):
     return folded, truth, bool(index[case]["developable"])
 
 
-def rows(name, shared, seconds):
+def rows(name, shared, blocks, seconds):
     """Return one body's rows."""
-    folded, truth, developable = load(name, shared)
+    folded, truth, developable = load(name, shared, blocks)
     facts = {"body": name, "blocks_given": len(folded), "developable": developable}
     try:
         u = gu.unfold(folded)
@@ -78,6 +76,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*")
     parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--blocks", type=int, help="shrink or grow simulated bodies to so many")
     parser.add_argument("--shared", type=Path, default=Path("../shared"))
     parser.add_argument("--seconds", type=float, default=600.0, help="per mesher")
     args = parser.parse_args()
@@ -90,7 +89,7 @@ def main():
     for name in names:
         if name in set(done["body"]):
             continue
-        found = rows(name, args.shared, args.seconds)
+        found = rows(name, args.shared, args.blocks, args.seconds)
         shown = [c for c in ("mesh", "interior", "volume_difference", "rms", "error") if c in found]
         sys.stdout.write(f"{name}\n{found[shown].to_string(index=False)}\n")
         sys.stdout.flush()

@@ -173,6 +173,7 @@ EVERY = [
     *((("compare", "p.csv", "-o", "out.csv"), s) for s in (*SHEET[:-1], "top", "bottom", "mid")),
     *((("map", "given.npz", "p.csv", "-o", "out.csv"), s) for s in ("reading", "carrying")),
     (("simulate", "large", "-o", "out.csv"), "simulating"),
+    (("crosscheck", "p.csv", "-o", "out.csv"), "tetwild mesh"),  # in a process further down
 ]
 
 

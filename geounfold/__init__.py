@@ -26,6 +26,14 @@ if TYPE_CHECKING:
     from geounfold.control import ControlMesh
     from geounfold.drillholes import DrillHoles, read_drillholes
     from geounfold.errors import GeounfoldError, InputError
+    from geounfold.estimation import (
+        Estimation,
+        Neighbourhood,
+        Variogram,
+        estimate,
+        explore,
+        fit_variogram,
+    )
     from geounfold.estimator import Unfolder
     from geounfold.flattening import FLATTENERS, Flattening, flatten
     from geounfold.mapping import UnfoldingMap, load
@@ -50,6 +58,12 @@ _HOMES = {
     "read_drillholes": "drillholes",
     "GeounfoldError": "errors",
     "InputError": "errors",
+    "Estimation": "estimation",
+    "Neighbourhood": "estimation",
+    "Variogram": "estimation",
+    "estimate": "estimation",
+    "explore": "estimation",
+    "fit_variogram": "estimation",
     "FLATTENERS": "flattening",
     "Flattening": "flattening",
     "flatten": "flattening",
@@ -74,15 +88,18 @@ __all__ = [
     "ControlMesh",
     "CrossCheck",
     "DrillHoles",
+    "Estimation",
     "Flattening",
     "GeounfoldError",
     "InputError",
+    "Neighbourhood",
     "TetMesh",
     "TriMesh",
     "UnfoldOptions",
     "Unfolder",
     "Unfolding",
     "UnfoldingMap",
+    "Variogram",
     "__version__",
     "aligned_rms",
     "axes_from_angles",
@@ -90,6 +107,9 @@ __all__ = [
     "compare",
     "crosscheck",
     "epsilon",
+    "estimate",
+    "explore",
+    "fit_variogram",
     "flatten",
     "load",
     "neighbours",

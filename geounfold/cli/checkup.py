@@ -95,7 +95,7 @@ def _libraries() -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     return needed, extras
 
 
-_EXTRAS = ("formats", "completion", "tetgen")  # those for users
+_EXTRAS = ("formats", "geostat", "completion", "tetgen")  # those for users
 
 
 def _library(requirement: Requirement) -> dict[str, Any]:

@@ -2,6 +2,8 @@
 
 from geounfold.synthetic.body import Body, FoldSpec, Sheet
 from geounfold.synthetic.catalogue import CASES, simulate
+from geounfold.synthetic.drilling import PATTERNS, DrilledTables, drill
+from geounfold.synthetic.grades import FIELD_KINDS, GradeField
 from geounfold.synthetic.outline import (
     Bulge,
     Ellipse,
@@ -23,17 +25,21 @@ from geounfold.synthetic.surfaces import AnalyticSurface, cone, cylinder, slab, 
 __all__ = [
     "CASES",
     "FAMILIES",
+    "FIELD_KINDS",
+    "PATTERNS",
     "AnalyticSurface",
     "Bend",
     "Body",
     "Bulge",
     "Bump",
+    "DrilledTables",
     "Ellipse",
     "Embayment",
     "Even",
     "FlexuralSlip",
     "FoldSpec",
     "Gap",
+    "GradeField",
     "Hole",
     "Lens",
     "Neck",
@@ -46,6 +52,7 @@ __all__ = [
     "Wedge",
     "cone",
     "cylinder",
+    "drill",
     "random_body",
     "random_family",
     "simulate",

@@ -1,0 +1,191 @@
+"""gstlearn: kriging systems and inverse distances, for neighbourhoods chosen by the caller.
+
+gstlearn looks for neighbours itself but knows no largest number per drill-hole, and takes longer
+the more samples there are. Here every target stands on an island of its own, with the samples
+chosen for it and no others: islands lie farther apart than the search reaches, so the library's
+nearest samples are the chosen ones. Covariances depend on differences alone, so nothing else
+changes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import BackendError, MissingDependencyError
+from geounfold.mesh import Floats, Ints
+
+ISLANDS = 16
+"""Targets a call: the library's cost per target is lowest there, and offsets stay small."""
+
+_KINDS = {"spherical": "SPHERICAL", "exponential": "EXPONENTIAL", "gaussian": "GAUSSIAN"}
+
+Part = tuple[str, float, Sequence[float]]
+"""Kind, sill and three ranges of a structure."""
+
+
+def library() -> ModuleType:
+    """Return gstlearn.
+
+    Raises
+    ------
+    MissingDependencyError
+        It is not installed.
+    """
+    try:
+        import gstlearn
+    except ImportError as error:
+        raise MissingDependencyError(
+            "kriging needs gstlearn: pip install 'geounfold[geostat]'"
+        ) from error
+    found: ModuleType = gstlearn
+    return found
+
+
+def krige(
+    offsets: Floats,
+    values: Floats,
+    counts: Ints,
+    nugget: float,
+    structures: Sequence[Part],
+    mean: float | None,
+) -> tuple[Floats, Floats]:
+    """Krige targets from the samples chosen for each.
+
+    Parameters
+    ----------
+    offsets : (m, k, 3) float
+        From each target to its samples, along the axes of the ranges.
+    values : (m, k) float
+        The samples' values.
+    counts : (m,) int
+        How many of them there are: the first so many of each row; at least 1.
+    nugget : float
+        Variance at no distance.
+    structures : sequence of (kind, sill, ranges)
+        Spherical, exponential or gaussian; ranges are where 5 % of the covariance is left, of the
+        spherical one where none is.
+    mean : float, optional
+        Known mean, for simple kriging; ordinary without.
+
+    Returns
+    -------
+    estimate, variance : (m,) float
+        NaN where the system cannot be solved.
+
+    Raises
+    ------
+    BackendError
+        The library refuses.
+    """
+    gl = library()
+    space = _space(gl)
+    model = _model(gl, space, nugget, structures, mean)
+    estimate, deviation = np.full(len(counts), np.nan), np.full(len(counts), np.nan)
+    with _silence():
+        for rows in _batches(len(counts)):
+            far = _reach(offsets[rows], counts[rows])
+            nearest = gl.NeighMoving.create(False, offsets.shape[1], far)
+            source, target = _islands(gl, offsets[rows], values[rows], counts[rows], 4 * far)
+            if gl.kriging(source, target, model, nearest, True, True, False):
+                raise BackendError("gstlearn's kriging failed")
+            estimate[rows] = target.getColumn("Kriging.v.estim")
+            deviation[rows] = target.getColumn("Kriging.v.stdev")
+    # An unsolvable system comes back as estimate 0 without a deviation.
+    return np.where(np.isnan(deviation), np.nan, estimate), deviation**2
+
+
+def inverse_distance(offsets: Floats, values: Floats, counts: Ints, power: float) -> Floats:
+    """Return means (m,) of samples weighted by a power of their inverse distance.
+
+    Parameters are those of `krige`; a sample at no distance is the answer.
+    """
+    gl = library()
+    _space(gl)
+    estimate = np.full(len(counts), np.nan)
+    with _silence():
+        for rows in _batches(len(counts)):
+            far = _reach(offsets[rows], counts[rows])
+            source, target = _islands(gl, offsets[rows], values[rows], counts[rows], 4 * far)
+            if gl.inverseDistance(source, target, power, True, far):
+                raise BackendError("gstlearn's inverse distances failed")
+            estimate[rows] = target.getColumn("InvDist.v.estim")
+    return estimate
+
+
+def _space(gl: ModuleType) -> Any:
+    """Return the space of three dimensions, made the library's default where it is not."""
+    if gl.getDefaultSpaceDimension() != 3:
+        gl.defineDefaultSpace(gl.ESpaceType.RN, 3)
+    return gl.SpaceRN.create(3)
+
+
+def _model(
+    gl: ModuleType, space: Any, nugget: float, structures: Sequence[Part], mean: float | None
+) -> Any:
+    parts = [(_KINDS[kind], sill, list(ranges)) for kind, sill, ranges in structures]
+    if nugget > 0 or not parts:
+        parts.append(("NUGGET", nugget, [1.0, 1.0, 1.0]))
+    name, sill, ranges = parts[0]
+    kind = getattr(gl.ECov, name)
+    model = gl.Model.createFromParam(
+        kind, 1.0, sill, 1.0, ranges, gl.MatrixSymmetric(), [], space, True
+    )
+    for name, sill, ranges in parts[1:]:
+        model.addCovFromParam(getattr(gl.ECov, name), 1.0, sill, 1.0, ranges)
+    if mean is None:
+        model.setDriftIRF(0)
+    else:
+        model.setMean(mean)
+    return model
+
+
+def _reach(offsets: Floats, counts: Ints) -> float:
+    """Return a little more than the largest distance of a sample from its target."""
+    used = np.arange(offsets.shape[1]) < counts[:, None]
+    far = float(np.sqrt((offsets**2).sum(axis=2)[used].max(initial=0.0)))
+    return 1.01 * far if far > 0 else 1.0
+
+
+def _batches(n: int) -> Iterator[slice]:
+    return (slice(start, min(start + ISLANDS, n)) for start in range(0, n, ISLANDS))
+
+
+def _islands(
+    gl: ModuleType, offsets: Floats, values: Floats, counts: Ints, apart: float
+) -> tuple[Any, Any]:
+    """Return tables of the samples and targets of a batch, each target on its island."""
+    used = np.arange(offsets.shape[1]) < counts[:, None]
+    centres = np.zeros((len(counts), 3))
+    centres[:, 0] = apart * np.arange(len(counts))
+    samples = (offsets + centres[:, None])[used]
+    return _table(gl, samples, values[used]), _table(gl, centres, None)
+
+
+def _table(gl: ModuleType, points: Floats, values: Floats | None) -> Any:
+    table = gl.Db.create()
+    for axis in range(3):
+        table.addColumns(np.ascontiguousarray(points[:, axis]), f"x{axis}", gl.ELoc.X, axis)
+    if values is not None:
+        table.addColumns(np.ascontiguousarray(values), "v", gl.ELoc.Z, 0)
+    return table
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep the library's complaints off stdout: what went wrong is told by the answer."""
+    sys.stdout.flush()
+    kept, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nothing)

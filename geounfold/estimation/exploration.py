@@ -1,0 +1,223 @@
+"""Samples looked at before they estimate: tables that `geounfold.charts` draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError, OptionError
+from geounfold.estimation.estimate import FlatSamples, flat_samples
+from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
+from geounfold.mesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """Everything that exploratory data analysis tells of one grade.
+
+    Attributes
+    ----------
+    grade : str
+    samples : FlatSamples
+    histogram : DataFrame
+        See `histogram`.
+    layers : DataFrame
+        Statistics by layer, from the bottom up; see `statistics`.
+    variograms : dict of DataFrame
+        Experimental ones in each space (folded, unfolded); see `directional`.
+    models : dict of FittedVariogram
+        Fitted in each space, with one range along and one across.
+    swaths : dict of DataFrame
+        Along x, y and the stratigraphic coordinate; see `swath`.
+    contacts : dict of DataFrame
+        Across the bottom and the top; see `contact`. Distances are in thicknesses.
+    """
+
+    grade: str
+    samples: FlatSamples
+    histogram: pd.DataFrame
+    layers: pd.DataFrame
+    variograms: Mapping[str, pd.DataFrame]
+    models: Mapping[str, FittedVariogram]
+    swaths: Mapping[str, pd.DataFrame]
+    contacts: Mapping[str, pd.DataFrame]
+
+
+def explore(
+    unfolding: Any,
+    samples: pd.DataFrame,
+    *,
+    grade: str,
+    hole: str | None = None,
+    layers: int = 10,
+    bins: int = 30,
+) -> Exploration:
+    """Return the tables of exploratory data analysis of one grade, in both spaces.
+
+    Parameters
+    ----------
+    unfolding : Unfolding or UnfoldingMap
+    samples : DataFrame
+        As `estimate` takes them.
+    grade, hole : str
+        Columns of the samples.
+    layers : int
+        Slices of equal stratigraphic height from bottom to top.
+    bins : int
+        Of the histogram and of the swaths.
+
+    Raises
+    ------
+    InputError
+        Samples without what is needed, or too few for a variogram (20).
+    OptionError
+        Numbers of layers or bins below 1.
+    """
+    for name, value in (("layers", layers), ("bins", bins)):
+        if not isinstance(value, int) or value < 1:
+            raise OptionError(f"{name} must be a whole number of 1 or more, not {value!r}")
+    flat = flat_samples(getattr(unfolding, "map", unfolding), samples, grade=grade, hole=hole)
+    s, v = flat.stratigraphic, flat.grades
+    places = {"x": flat.points[:, 0], "y": flat.points[:, 1], "stratigraphic": s}
+    return Exploration(
+        grade=grade,
+        samples=flat,
+        histogram=histogram(v, bins),
+        layers=by_layer(s, v, layers),
+        variograms={"folded": directional(flat.folded, v), "unfolded": directional(flat.points, v)},
+        models={
+            "folded": fit_variogram(flat.folded, v),
+            "unfolded": fit_variogram(flat.points, v),
+        },
+        swaths={name: swath(place, v, bins) for name, place in places.items()},
+        contacts={"bottom": contact(s, v, 0.05), "top": contact(1 - s, v, 0.05)},
+    )
+
+
+def statistics(values: Floats) -> dict[str, float]:
+    """Return count, mean, std, cv, min, p10, p25, p50, p75, p90 and max of values (n,)."""
+    v = np.asarray(values, dtype=np.float64)
+    v = v[np.isfinite(v)]
+    names = ("min", "p10", "p25", "p50", "p75", "p90", "max")
+    if not len(v):
+        return {"count": 0, **dict.fromkeys(("mean", "std", "cv", *names), float("nan"))}
+    mean, std = float(v.mean()), float(v.std(ddof=1)) if len(v) > 1 else float("nan")
+    quantiles = np.quantile(v, (0, 0.1, 0.25, 0.5, 0.75, 0.9, 1)).tolist()
+    return {
+        "count": len(v),
+        "mean": mean,
+        "std": std,
+        "cv": std / mean if mean else float("nan"),
+        **dict(zip(names, quantiles, strict=True)),
+    }
+
+
+def histogram(values: Floats, bins: int = 30) -> pd.DataFrame:
+    """Return columns low, high, count, share and cumulative (share up to high)."""
+    v = _known(values)
+    count, edges = np.histogram(v, bins)
+    share = count / len(v)
+    return pd.DataFrame(
+        {
+            "low": edges[:-1],
+            "high": edges[1:],
+            "count": count,
+            "share": share,
+            "cumulative": np.cumsum(share),
+        }
+    )
+
+
+def by_layer(stratigraphic: Floats, values: Floats, layers: int = 10) -> pd.DataFrame:
+    """Return statistics by layer: columns layer (1 the lowest), from, to, and `statistics`.
+
+    Parameters
+    ----------
+    stratigraphic : (n,) float
+        0 at the bottom, 1 at the top; what lies beyond belongs to no layer.
+    values : (n,) float
+    layers : int
+    """
+    s, v = np.asarray(stratigraphic), np.asarray(values)
+    layer = np.floor(s * layers)
+    layer[s == 1] = layers - 1
+    rows = [
+        {"layer": k + 1, "from": k / layers, "to": (k + 1) / layers, **statistics(v[layer == k])}
+        for k in range(layers)
+    ]
+    return pd.DataFrame(rows)
+
+
+def swath(place: Floats, values: Floats, bins: int = 30) -> pd.DataFrame:
+    """Return mean values in slices: columns low, high, count, mean, std; NaN where empty.
+
+    Parameters
+    ----------
+    place : (n,) float
+        Coordinate along the swath.
+    values : (n,) float
+    bins : int
+        Slices of equal width.
+    """
+    place = np.asarray(place, dtype=np.float64)
+    v = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(place) & np.isfinite(v)
+    place, v = place[good], _known(v[good])
+    edges = np.linspace(float(place.min()), float(place.max()), bins + 1)
+    index = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, bins - 1)
+    return _binned(index, v, edges)
+
+
+def contact(
+    distance: Floats, values: Floats, width: float, reach: float | None = None
+) -> pd.DataFrame:
+    """Return mean values by distance from a contact: columns as `swath`.
+
+    Parameters
+    ----------
+    distance : (n,) float
+        Signed: above 0 inside, below 0 outside.
+    values : (n,) float
+    width : float
+        Of the slices, of which one begins at the contact.
+    reach : float, optional
+        Largest distance; ten slices without.
+
+    Raises
+    ------
+    OptionError
+        A width or reach that is not above 0.
+    """
+    reach = 10 * width if reach is None else reach
+    if not (width > 0 and reach > 0):
+        raise OptionError(f"width and reach must be above 0, not {width} and {reach}")
+    d, v = np.asarray(distance, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    side = max(1, round(reach / width))
+    edges = width * np.arange(-side, side + 1)
+    index = np.floor(d / width) + side
+    good = np.isfinite(d) & np.isfinite(v) & (index >= 0) & (index < 2 * side)
+    return _binned(index[good].astype(np.int64), v[good], edges)
+
+
+def _binned(index: Ints, v: Floats, edges: np.ndarray) -> pd.DataFrame:
+    bins = len(edges) - 1
+    count = np.bincount(index, minlength=bins)
+    some = np.where(count > 0, count, 1)
+    mean = np.where(count > 0, np.bincount(index, v, bins) / some, np.nan)
+    square = np.bincount(index, (v - np.where(count > 0, mean, 0.0)[index]) ** 2, bins)
+    std = np.where(count > 1, np.sqrt(square / np.maximum(count - 1, 1)), np.nan)
+    return pd.DataFrame(
+        {"low": edges[:-1], "high": edges[1:], "count": count, "mean": mean, "std": std}
+    )
+
+
+def _known(values: Floats) -> Floats:
+    v = np.asarray(values, dtype=np.float64)
+    v = v[np.isfinite(v)]
+    if not len(v):
+        raise InputError("there are no values")
+    return v

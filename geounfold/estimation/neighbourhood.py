@@ -1,0 +1,167 @@
+"""Which samples estimate a target: search ellipsoid, fewest and most, most of one hole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.errors import OptionError
+from geounfold.estimation.variogram import Triple, numbers
+from geounfold.mesh import Bools, Floats, Ints
+from geounfold.synthetic.body import rotation as turned
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neighbourhood:
+    """A moving neighbourhood.
+
+    Parameters
+    ----------
+    radii : (float, float, float)
+        Of the search ellipsoid along its axes, in the points' unit.
+    rotation : (float, float, float)
+        Bearing, plunge and dip of the axes, degrees, as `Variogram` has them.
+    min_samples : int
+        Targets with fewer are not estimated.
+    max_samples : int
+        The nearest so many, in the ellipsoid's measure.
+    max_per_hole : int, optional
+        The nearest so many of one hole, and then the next holes' samples.
+
+    Raises
+    ------
+    OptionError
+        A value outside its valid ones.
+    """
+
+    radii: Triple
+    rotation: Triple = (0.0, 0.0, 0.0)
+    min_samples: int = 4
+    max_samples: int = 24
+    max_per_hole: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radii", numbers("the search radii", self.radii, 3))
+        object.__setattr__(self, "rotation", numbers("the rotation", self.rotation, 3))
+        if not min(self.radii) > 0:
+            raise OptionError(f"the search radii must be above 0, but are {self.radii}")
+        for name in ("min_samples", "max_samples", "max_per_hole"):
+            value = getattr(self, name)
+            if name == "max_per_hole" and value is None:
+                continue
+            if not isinstance(value, int | np.integer) or value < 1:
+                raise OptionError(f"{name} must be a whole number of 1 or more, not {value!r}")
+        if self.min_samples > self.max_samples:
+            raise OptionError(
+                f"min_samples ({self.min_samples}) must not exceed max_samples ({self.max_samples})"
+            )
+
+    @property
+    def axes(self) -> Floats:
+        """The axes as rows, (3, 3)."""
+        return turned(*self.rotation)
+
+    def measured(self, points: Floats) -> Floats:
+        """Return points (n, 3) in units of the radii along the axes."""
+        out: Floats = points @ self.axes.T / self.radii
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The samples of each target, the nearest first.
+
+    Attributes
+    ----------
+    rows : (m, k) int
+        Rows of the samples; 0 beyond the count.
+    counts : (m,) int
+    """
+
+    rows: Ints
+    counts: Ints
+
+
+class Search:
+    """Finds the samples of targets.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        The samples' places, in an order that does not depend on how they were given: of samples
+        equally far the tree takes the same then.
+    holes : (n,) int or None
+        The hole of each.
+    near : Neighbourhood
+    """
+
+    def __init__(self, points: Floats, holes: Ints | None, near: Neighbourhood) -> None:
+        self._near = near
+        self._tree = cKDTree(near.measured(points))
+        self._holes = holes
+
+    def find(self, targets: Floats, own: Ints | None = None) -> Found:
+        """Return the samples of targets (m, 3).
+
+        Parameters
+        ----------
+        targets : (m, 3) float
+        own : (m,) int, optional
+            A hole whose samples are left out, for cross-validation; -1 for none.
+        """
+        near, places = self._near, self._near.measured(targets)
+        m, most = len(targets), min(near.max_samples, self._tree.n)
+        rows, counts = np.zeros((m, most), dtype=np.int64), np.zeros(m, dtype=np.int64)
+        left = np.arange(m)
+        simple = near.max_per_hole is None and own is None
+        asked = most if simple else min(2 * most, self._tree.n)
+        while len(left):
+            found = self._tree.query(places[left], k=asked, distance_upper_bound=1.0)[1]
+            found = found.reshape(len(left), asked)
+            keep = self._allowed(found, None if own is None else own[left])
+            keep &= np.cumsum(keep, axis=1) <= most
+            count = keep.sum(axis=1)
+            # Rows that were cut short at the last one asked for may have more to give.
+            short = (count < most) & (found[:, -1] < self._tree.n) & (asked < self._tree.n)
+            done = np.flatnonzero(~short)
+            rows[left[done]] = _packed(found[done], keep[done], most)
+            counts[left[done]] = count[done]
+            left = left[short]
+            asked = min(4 * asked, self._tree.n)
+        return Found(rows, counts)
+
+    def _allowed(self, found: Ints, own: Ints | None) -> Bools:
+        """Return which samples found, (m, k) nearest first, may be used."""
+        keep: Bools = found < self._tree.n
+        if self._holes is None:
+            return keep
+        hole = self._holes[np.where(keep, found, 0)]
+        if own is not None:
+            keep &= hole != own[:, None]
+        if self._near.max_per_hole is not None:
+            hole = np.where(keep, hole, -1)
+            keep &= _turn(hole) < self._near.max_per_hole
+        return keep
+
+
+def _turn(groups: Ints) -> Ints:
+    """Return how many earlier entries of its row each entry equals."""
+    order = np.argsort(groups, axis=1, kind="stable")
+    ordered = np.take_along_axis(groups, order, axis=1)
+    place = np.broadcast_to(np.arange(groups.shape[1]), groups.shape)
+    first = np.ones(groups.shape, dtype=bool)
+    first[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+    start = np.maximum.accumulate(np.where(first, place, 0), axis=1)
+    out = np.empty_like(groups)
+    np.put_along_axis(out, order, place - start, axis=1)
+    return out
+
+
+def _packed(found: Ints, keep: Bools, most: int) -> Ints:
+    """Return the kept entries of each row moved to its front, (m, most); 0 behind them."""
+    order = np.argsort(~keep, axis=1, kind="stable")[:, :most]
+    kept = np.take_along_axis(keep, order, axis=1)
+    out: Ints = np.where(kept, np.take_along_axis(found, order, axis=1), 0)
+    return out

@@ -1,0 +1,204 @@
+"""Variogram models: a nugget and nested structures along three axes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import OptionError
+from geounfold.mesh import Floats
+from geounfold.synthetic.body import rotation as turned
+
+KINDS = ("spherical", "exponential", "gaussian")
+"""The structures."""
+
+LEAST_NUGGET = 1e-4
+"""Share of the sill below which systems of a gaussian model alone cannot be solved."""
+
+_LEFT = np.log(20.0)  # 5 % of the covariance is left at the range
+
+Triple = tuple[float, float, float]
+
+
+def correlation(kind: str, h: Floats) -> Floats:
+    """Return the correlation of a structure at distances in units of its range.
+
+    Spherical: 1 - 3 h / 2 + h^3 / 2, none from 1 on; exponential: 20^-h; gaussian: 20^-h^2: 5 %
+    is left at the range (Chiles and Delfiner 2012, section 2.5).
+
+    Examples
+    --------
+    >>> [float(correlation(kind, np.array([1.0]))[0].round(3)) for kind in KINDS]
+    [0.0, 0.05, 0.05]
+    """
+    if kind == "spherical":
+        r = np.minimum(h, 1.0)
+        return np.asarray(1 - 1.5 * r + 0.5 * r**3)
+    return np.asarray(np.exp(-_LEFT * (h if kind == "exponential" else h**2)))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """One structure of a variogram.
+
+    Parameters
+    ----------
+    kind : {"spherical", "exponential", "gaussian"}
+    sill : float
+        Its part of the variance, above 0.
+    ranges : (float, float, float)
+        Along the model's axes, in the points' unit.  In the unfolded space with no rotation: two
+        along the layer and one across it.
+
+    Raises
+    ------
+    OptionError
+        A kind that does not exist; a sill or range that is not above 0.
+    """
+
+    kind: str
+    sill: float
+    ranges: Triple
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise OptionError(f"structure {self.kind!r} is not one of: {', '.join(KINDS)}")
+        sill = numbers("the sill of a structure", (self.sill,), 1)[0]
+        ranges = numbers("the ranges of a structure", self.ranges, 3)
+        if not (sill > 0 and min(ranges) > 0):
+            raise OptionError(f"sill and ranges must be above 0, but are {sill} and {ranges}")
+        object.__setattr__(self, "sill", sill)
+        object.__setattr__(self, "ranges", ranges)
+
+
+@dataclass(frozen=True)
+class Variogram:
+    """A variogram model.
+
+    Parameters
+    ----------
+    nugget : float
+        Variance at no distance, 0 or more.
+    structures : tuple of Structure
+    rotation : (float, float, float)
+        Bearing, plunge and dip of the axes, degrees, as block models have them: the second axis
+        points to the bearing (clockwise from +y) and down by the plunge; the first turns down
+        about it by the dip.
+
+    Raises
+    ------
+    OptionError
+        A value outside its valid ones, no sill at all, or a gaussian structure without a nugget.
+    """
+
+    nugget: float
+    structures: tuple[Structure, ...]
+    rotation: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nugget", numbers("the nugget", (self.nugget,), 1)[0])
+        object.__setattr__(self, "rotation", numbers("the rotation", self.rotation, 3))
+        object.__setattr__(self, "structures", tuple(self.structures))
+        if self.nugget < 0:
+            raise OptionError(f"the nugget must not be negative, but is {self.nugget}")
+        if not self.sill > 0:
+            raise OptionError("a variogram needs a nugget or a structure")
+        smooth = {s.kind for s in self.structures} == {"gaussian"}
+        if smooth and self.nugget < LEAST_NUGGET * self.sill:
+            raise OptionError(
+                f"a gaussian structure needs a nugget of at least {LEAST_NUGGET:g} of the sill, "
+                f"here {LEAST_NUGGET * self.sill:.3g}: systems cannot be solved without"
+            )
+
+    @property
+    def sill(self) -> float:
+        """The whole variance, nugget included."""
+        return self.nugget + sum(s.sill for s in self.structures)
+
+    @property
+    def ranges(self) -> Triple:
+        """The greatest range along each axis; 0 of a pure nugget."""
+        if not self.structures:
+            return 0.0, 0.0, 0.0
+        a, b, c = np.max([s.ranges for s in self.structures], axis=0).tolist()
+        return a, b, c
+
+    @property
+    def axes(self) -> Floats:
+        """The axes as rows, (3, 3)."""
+        return turned(*self.rotation)
+
+    def gamma(self, separation: Floats) -> Floats:
+        """Return the semivariance, (n,), at separations (n, 3); 0 where there is none."""
+        h = np.asarray(separation, dtype=np.float64) @ self.axes.T
+        left = np.zeros(len(h))
+        for s in self.structures:
+            left += s.sill * correlation(s.kind, np.linalg.norm(h / s.ranges, axis=1))
+        return np.where((h == 0).all(axis=1), 0.0, self.sill - left)
+
+    def facts(self) -> dict[str, Any]:
+        """Return the model in the form that `from_facts` reads."""
+        return {
+            "nugget": self.nugget,
+            "structures": [
+                {"kind": s.kind, "sill": s.sill, "ranges": list(s.ranges)} for s in self.structures
+            ],
+            "rotation": list(self.rotation),
+        }
+
+
+def from_facts(facts: Any, source: str = "the variogram") -> Variogram:
+    """Return the model of a dict: nugget, structures (kind, sill, ranges), rotation.
+
+    Raises
+    ------
+    OptionError
+        A word that is missing or unknown, or a value outside its valid ones.
+    """
+    if not isinstance(facts, Mapping):
+        raise OptionError(f"{source}: must be an object with nugget, structures and rotation")
+    known = {"nugget", "structures", "rotation"}
+    if set(facts) - known or "structures" not in facts:
+        raise OptionError(f"{source}: needs structures, and may have nugget and rotation, no other")
+    structures = facts["structures"]
+    if not isinstance(structures, list | tuple) or not all(
+        isinstance(s, Mapping) and set(s) == {"kind", "sill", "ranges"} for s in structures
+    ):
+        raise OptionError(f"{source}: each structure needs kind, sill and ranges, and no other")
+    try:
+        parts = tuple(Structure(s["kind"], s["sill"], s["ranges"]) for s in structures)
+        return Variogram(facts.get("nugget", 0.0), parts, facts.get("rotation", (0.0, 0.0, 0.0)))
+    except OptionError as error:
+        raise OptionError(f"{source}: {error}") from error
+
+
+def from_json(text: str, source: str) -> Variogram:
+    """Return the model in JSON: itself, or under ``variogram`` as in a summary.
+
+    Raises
+    ------
+    OptionError
+        Not JSON, or not such a model.
+    """
+    try:
+        facts = json.loads(text)
+    except ValueError as error:
+        raise OptionError(f"{source}: not valid JSON: {error}") from error
+    if isinstance(facts, Mapping) and "variogram" in facts:
+        facts = facts["variogram"]
+    return from_facts(facts, source)
+
+
+def numbers(what: str, values: Any, count: int) -> tuple[Any, ...]:
+    """Return so many finite numbers as floats, or raise OptionError."""
+    try:
+        found = tuple(float(v) for v in values)
+    except (TypeError, ValueError) as error:
+        raise OptionError(f"{what}: {values!r} is not {count} numbers") from error
+    if len(found) != count or not np.isfinite(found).all():
+        raise OptionError(f"{what}: {values!r} is not {count} finite numbers")
+    return found

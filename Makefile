@@ -3,7 +3,7 @@
 # system libraries that README.md names.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env demo test test-all check format bench soak notebooks accept clean
+.PHONY: help env demo test test-all check format bench soak study notebooks accept clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -15,6 +15,7 @@ PYTEST_ARGS ?=
 BENCH_ARGS ?=
 SOAK_ARGS ?=
 RUNS ?= 10
+STUDY_ARGS ?=
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*  ## ' $(MAKEFILE_LIST) | awk -F ':.*  ## ' '{printf "%-12s%s\n", $$1, $$2}'
@@ -67,7 +68,11 @@ bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
 soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
 
-notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each whole; RUNS: times taken
+study: $(STAMP)  ## krige in folded, unfolded and true space, in 30 minutes; goes on where stopped
+	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)
+	$(BIN)/python tests/study/tables.py data/study.csv -o data/study.md --figure data/study.png
+
+notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each; RUNS: times taken
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py
 	GEOUNFOLD_RUNS=$(RUNS) $(BIN)/python -m pytest --nbmake -n 2 notebooks/*.ipynb $(PYTEST_ARGS)
 

@@ -27,8 +27,8 @@ from geounfold.frame import Frame
 from geounfold.mesh import TetMesh
 from geounfold.report import CarriedHoles, CarriedPoints
 
-COMMANDS = ["unfold", "map", "compare", "quality", "simulate", "view"]
-COMMANDS += ["crosscheck", "init", "doctor", "completion"]
+COMMANDS = ["unfold", "map", "estimate", "compare", "crosscheck", "quality", "simulate"]
+COMMANDS += ["view", "grid", "transfer", "init", "doctor", "completion"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
 PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
 RESULTS = [*PLACE, "location", "mesh_distance"]

@@ -265,6 +265,35 @@ def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> No
         )
 
 
+def estimate(args: Namespace, console: Console) -> None:
+    """Estimate a grade on blocks from samples, in the unfolded space of a saved map."""
+    from geounfold.cli.estimating import estimation, summarised
+
+    outputs = Outputs.planned(
+        {"--output": (args.output, _POINTS_OUT), "--summary": (args.summary, _JSON)},
+        _given(args.map, args.samples, args.points, args.variogram),
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    existing_file(Path(args.map))
+    table = _read(args.points, args, console)
+    table.check_writable(args.output)
+    samples = _read_samples(args, console)
+    if samples is None:
+        raise OptionError("estimate needs SAMPLES")
+    result = estimation(args, samples, table, console.stage)
+    summary = {**summarised(args, result, console.stage), "command": _command(args)}
+    with outputs.writing() as parts:
+        table.write(parts["--output"], result.columns)
+        if "--summary" in parts:
+            write_json(parts["--summary"], summary)
+    for warning in result.warnings():
+        console.warn(warning)
+    known = result.blocks.counts()["estimated"]
+    console.done(f"{args.grade} estimated on {known} of {len(table)} blocks into {args.output}")
+    console.answer(summary)
+
+
 def compare(args: Namespace, console: Console) -> None:
     """Try flatteners on one body or surface and write a table of how they did."""
     outputs = Outputs.planned(

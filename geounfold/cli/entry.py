@@ -27,6 +27,7 @@ _NO_MEMORY = re.compile(
 _COMMANDS = {
     "unfold": "unfold",
     "map": "carry",
+    "estimate": "estimate",
     "compare": "compare",
     "crosscheck": "crosscheck",
     "quality": "quality",

@@ -3,8 +3,8 @@
     python tests/study/tables.py [data/study.csv] [-o data/study.md] [--figure data/study.png]
 
 Gain: 1 - RMSE(arm) / RMSE(folded_best). Share of the possible gain: what of the difference between
-folded_best and truth an arm reaches. RMSEs are means over runs; intervals are those in which 95 % of
-2,000 means over seeds drawn with replacement lie (bootstrap over seeds, bodies and spacings kept).
+folded_best and truth an arm reaches. RMSEs are means over runs; between low and high lie 95 % of
+2,000 means over seeds drawn with replacement (bootstrap over seeds, bodies and spacings kept).
 """
 
 from __future__ import annotations

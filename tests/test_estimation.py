@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import geounfold as gu
+from geounfold.charts import charts
 from geounfold.errors import BackendError, InputError, OptionError
 from geounfold.estimation import (
     FLAGS,
@@ -339,6 +342,15 @@ def test_exploration_of_both_spaces(drilled) -> None:
     s = e.samples.stratigraphic
     assert e.layers["count"].sum() == np.count_nonzero((s >= 0) & (s <= 1))
     assert set(e.swaths) == {"x", "y", "stratigraphic"}
+    drawn = charts(e)
+    assert list(drawn) == ["histogram", "layers", "variograms", "swaths", "contacts"]
+    panels = {name: len(figure.axes) for name, figure in drawn.items()}
+    # Profiles have a second axis for counts each, as the histogram has for shares.
+    assert panels == {"histogram": 2, "layers": 1, "variograms": 2, "swaths": 6, "contacts": 4}
+    for figure in drawn.values():
+        picture = io.BytesIO()
+        figure.savefig(picture)
+        assert picture.getvalue()[:4] == b"\x89PNG"
     # The field's anisotropy is 6 to 1 (150 over 25); folded limbs at 70 degrees hide most of it.
     ratio = {name: m.model.ranges[0] / m.model.ranges[2] for name, m in e.models.items()}
     assert ratio["unfolded"] > 1.5 * ratio["folded"]

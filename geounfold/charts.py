@@ -1,0 +1,139 @@
+"""Figures of exploratory data analysis: one function for each table of `geounfold.estimation`.
+
+Every ``chart_`` function returns a matplotlib Figure that belongs to no window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from geounfold.estimation import Exploration, FittedVariogram
+
+# Okabe and Ito's colours, which stay apart for colour-blind readers.
+ALONG, ACROSS, BARS, MEAN = "#0072B2", "#E69F00", "#999999", "#D55E00"
+
+_CURVE = 100  # points of a model's curve
+
+
+def charts(exploration: Exploration) -> dict[str, Figure]:
+    """Return every figure of an exploration by name, in the order to be shown."""
+    e = exploration
+    return {
+        "histogram": chart_histogram(e.histogram, e.grade),
+        "layers": chart_layers(e.layers, e.grade),
+        "variograms": chart_variograms(e.variograms, e.models),
+        "swaths": chart_swaths(e.swaths, e.grade),
+        "contacts": chart_contacts(e.contacts, e.grade),
+    }
+
+
+def chart_histogram(table: pd.DataFrame, grade: str) -> Figure:
+    """Draw a histogram with the cumulative share (see `estimation.histogram`)."""
+    figure, (axes,) = _figure(1, (5.0, 3.4))
+    low, high = table["low"].to_numpy(), table["high"].to_numpy()
+    axes.bar(low, table["share"], width=high - low, align="edge", color=BARS, edgecolor="white")
+    axes.set(xlabel=grade, ylabel="share of samples")
+    right = axes.twinx()
+    right.step(high, table["cumulative"], where="pre", color=MEAN)
+    right.set(ylim=(0, 1.02), ylabel="cumulative share")
+    return figure
+
+
+def chart_layers(table: pd.DataFrame, grade: str) -> Figure:
+    """Draw means, quartiles and deciles by layer (see `estimation.exploration.by_layer`)."""
+    figure, (axes,) = _figure(1, (5.0, 4.0))
+    some = table[table["count"] > 0]
+    height = 0.5 * (some["from"] + some["to"]).to_numpy()
+    thick = (some["to"] - some["from"]).to_numpy()
+    axes.hlines(height, some["p10"], some["p90"], color=BARS, label="10 to 90 %")
+    axes.barh(
+        height, some["p75"] - some["p25"], 0.6 * thick, some["p25"], color=BARS, label="quartiles"
+    )
+    axes.plot(some["mean"], height, "o-", color=MEAN, label="mean")
+    for where, count in zip(height, some["count"], strict=True):
+        axes.annotate(
+            f"{count}", (1.01, where), xycoords=("axes fraction", "data"), fontsize=7, va="center"
+        )
+    axes.set(xlabel=grade, ylabel="stratigraphic height (0 bottom, 1 top)", ylim=(0, 1))
+    axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def chart_variograms(
+    tables: Mapping[str, pd.DataFrame], models: Mapping[str, FittedVariogram]
+) -> Figure:
+    """Draw experimental variograms along and across with their models, a panel for each space.
+
+    Parameters
+    ----------
+    tables : mapping of DataFrame
+        As `estimation.directional` returns them, by space.
+    models : mapping of FittedVariogram
+        By space.
+    """
+    figure, panels = _figure(len(tables), (4.4 * len(tables), 3.6))
+    for axes, (space, table) in zip(panels, tables.items(), strict=True):
+        for name, colour, unit in (("along", ALONG, (1, 0, 0)), ("across", ACROSS, (0, 0, 1))):
+            part = table[table["direction"] == name]
+            if not len(part):
+                continue
+            size = 5 + 40 * part["pairs"] / part["pairs"].max()
+            axes.scatter(part["distance"], part["gamma"], size, color=colour, label=name)
+            fitted = models.get(space)
+            if fitted is not None:
+                h = np.linspace(0, float(part["distance"].max()), _CURVE)[1:]
+                way = fitted.model.axes.T @ np.asarray(unit, dtype=np.float64)
+                axes.plot(h, fitted.model.gamma(h[:, None] * way), color=colour)
+        axes.set(title=space, xlabel="distance", ylabel="semivariance", xlim=(0, None))
+        axes.set_ylim(0, None)
+        axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def chart_swaths(tables: Mapping[str, pd.DataFrame], grade: str) -> Figure:
+    """Draw mean grades in slices with their counts, a panel for each axis."""
+    figure, panels = _figure(len(tables), (3.6 * len(tables), 3.2))
+    for axes, (name, table) in zip(panels, tables.items(), strict=True):
+        _profile(axes, table, grade)
+        axes.set_xlabel(name)
+    return figure
+
+
+def chart_contacts(tables: Mapping[str, pd.DataFrame], grade: str) -> Figure:
+    """Draw mean grades by distance from contacts, outside left of them and inside right."""
+    figure, panels = _figure(len(tables), (4.2 * len(tables), 3.2))
+    for axes, (name, table) in zip(panels, tables.items(), strict=True):
+        _profile(axes, table, grade)
+        axes.axvline(0.0, color="black", linewidth=1)
+        axes.set(title=name, xlabel="distance inside the contact, thicknesses")
+    return figure
+
+
+def _profile(axes: Axes, table: pd.DataFrame, grade: str) -> None:
+    """Draw mean and standard error over bars of counts."""
+    low, high = table["low"].to_numpy(), table["high"].to_numpy()
+    count = table["count"].to_numpy()
+    right = axes.twinx()
+    right.bar(low, count, width=high - low, align="edge", color=BARS, alpha=0.35)
+    right.set_ylabel("samples")
+    right.set_ylim(0, 3 * max(int(count.max()), 1))
+    error = (table["std"] / np.sqrt(np.maximum(count, 1))).fillna(0.0)
+    axes.errorbar(0.5 * (low + high), table["mean"], error, fmt="o-", color=MEAN, markersize=3)
+    axes.set_ylabel(f"mean {grade}")
+    axes.set_zorder(right.get_zorder() + 1)
+    axes.patch.set_visible(False)
+
+
+def _figure(panels: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, list(figure.subplots(1, panels, squeeze=False)[0])

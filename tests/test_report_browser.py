@@ -6,6 +6,7 @@ folder that GEOUNFOLD_ARTEFACTS names, by default one of pytest's own.
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from geounfold.errors import MissingDependencyError
 from geounfold.plotting import ViewOptions, check_rendering
@@ -148,9 +150,10 @@ def _settled(page: Any) -> None:
 
 
 def _seen(page: Any, space: str) -> bytes:
+    """Return a view's pixels, without its rounded border."""
     _settled(page)
-    picture: bytes = page.locator(f"#{space} canvas").screenshot()
-    return picture
+    picture = imread(io.BytesIO(page.locator(f"#{space} canvas").screenshot()))
+    return bytes(picture[4:-4, 4:-4].tobytes())
 
 
 def _facts(page: Any) -> dict[str, str]:

@@ -356,6 +356,7 @@ MAPS: dict[str, tuple[Callable[[], bytes], str]] = {
     "vertex -1": (lambda: _signed(tetrahedra=np.array([[0, 1, 2, -1]], "i4")), "0..3"),
     "nan": (lambda: _signed(folded=np.full((4, 3), np.nan)), "finite"),
     "mirror": (lambda: _signed(rotation=-np.eye(3)), "rotation"),
+    "no such coordinates": (lambda: _signed(coordinates=np.array(3, "i4")), "0, 1 or 2"),
     "scale of nothing": (lambda: _signed(scale=np.array(0.0)), "positive"),
     "sides below zero": (lambda: _signed(steps=np.array([1.0, -1, 1])), "positive"),
 }

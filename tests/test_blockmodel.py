@@ -24,7 +24,7 @@ from geounfold.cli import main
 from geounfold.errors import InputError, OptionError
 from geounfold.mesh import Floats, Ints
 
-TURNED = axes_from_angles(37.0, dip=20.0, plunge=-12.0)
+TURNED = axes_from_angles(37.0, plunge=-12.0, dip=20.0)
 UTM = np.array([412_300.0, 6_815_700.0, 1_400.0])
 
 
@@ -54,27 +54,27 @@ def _by_force(model: BlockModel, points: Floats) -> Ints:
 
 
 @given(st.floats(-360, 360), st.floats(-90, 90), st.floats(-90, 90))
-def test_axes_are_a_rotation(bearing: float, dip: float, plunge: float) -> None:
-    axes = axes_from_angles(bearing, dip, plunge)
+def test_axes_are_a_rotation(bearing: float, plunge: float, dip: float) -> None:
+    axes = axes_from_angles(bearing, plunge, dip)
     assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     assert np.isclose(np.linalg.det(axes), 1.0)
 
 
 def test_each_angle_turns_what_it_says() -> None:
-    # North is world y: a bearing of 0 points the model's x axis there, its y axis then to west.
-    assert np.allclose(axes_from_angles(0.0), [[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-    # A plunge of 30 lifts the x axis by sin 30 = 0.5, and leaves y level.
-    lifted = axes_from_angles(90.0, plunge=30.0)
-    assert np.isclose(lifted[0, 2], 0.5)
-    assert np.isclose(lifted[1, 2], 0.0)
-    # A dip of 30 lifts the y axis, and leaves x where it is.
-    dipping = axes_from_angles(90.0, dip=30.0)
-    assert np.isclose(dipping[1, 2], 0.5)
-    assert np.allclose(dipping[0], [1, 0, 0])
+    # East is world x: a bearing of 90 points the model's y axis there, its x axis then to south.
+    assert np.allclose(axes_from_angles(90.0), [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    # A plunge of 30 lowers the y axis by sin 30 = 0.5, and leaves x level.
+    plunging = axes_from_angles(0.0, plunge=30.0)
+    assert np.isclose(plunging[1, 2], -0.5)
+    assert np.isclose(plunging[0, 2], 0.0)
+    # A dip of 30 lowers the x axis, and leaves y where it is.
+    dipping = axes_from_angles(0.0, dip=30.0)
+    assert np.isclose(dipping[0, 2], -0.5)
+    assert np.allclose(dipping[1], [0, 1, 0])
 
 
 @pytest.mark.parametrize(
-    ("angles", "says"), [((np.nan, 0, 0), "finite"), ((90, 91, 0), "90"), ((90, 0, -95), "90")]
+    ("angles", "says"), [((np.nan, 0, 0), "finite"), ((0, 91, 0), "within 90"), ((0, -95, 0), "90")]
 )
 def test_angles_refused(angles: tuple[float, float, float], says: str) -> None:
     with pytest.raises(OptionError, match=says):
@@ -176,7 +176,7 @@ def test_sides_are_found_by_name(names: tuple[str, str, str]) -> None:
 
 def test_sides_and_turn_are_measured_where_nothing_tells_them() -> None:
     k = np.stack(np.meshgrid(*map(np.arange, (9, 8, 7)), indexing="ij"), -1).reshape(-1, 3)
-    axes = axes_from_angles(65.0)
+    axes = axes_from_angles(25.0)
     model = block_model(pd.DataFrame(index=range(len(k))), UTM + (k * [20, 10, 5]) @ axes)
     assert np.allclose(model.sizes, [20, 10, 5], rtol=1e-6)
     assert np.allclose(model.axes, axes, atol=1e-6)

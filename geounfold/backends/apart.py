@@ -2,8 +2,8 @@
 
 What such a call does to its process (a crash, a full memory, text on stdout) ends with that
 process and comes back as one BackendError.  Each call has a fresh process, so that what a library
-keeps between calls cannot change the answer, and a folder of its own to work in, which goes with it:
-fTetWild leaves a file where it runs.
+keeps between calls cannot change the answer, and a folder of its own to work in, which goes with
+it: fTetWild leaves a file where it runs.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -106,7 +105,7 @@ def _answer(source: BinaryIO, target: BinaryIO) -> None:
 def _search_path() -> str:
     """Return PYTHONPATH, absolute, with the folder that this very package came from in front."""
     given = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    return os.pathsep.join([_ROOT, *(os.path.abspath(path) for path in given if path)])
+    return os.pathsep.join([_ROOT, *(str(Path(path).resolve()) for path in given if path)])
 
 
 def _end(code: int, stderr: bytes) -> str:

@@ -1,4 +1,4 @@
-"""How a block model is turned: bearing, dip and plunge of its own axes."""
+"""How a block model is turned: bearing, plunge and dip of its own axes."""
 
 from __future__ import annotations
 
@@ -6,40 +6,38 @@ import numpy as np
 
 from geounfold.errors import OptionError
 from geounfold.mesh import Floats
+from geounfold.synthetic.body import rotation
 
 
-def axes_from_angles(bearing: float, dip: float = 0.0, plunge: float = 0.0) -> Floats:
+def axes_from_angles(bearing: float, plunge: float = 0.0, dip: float = 0.0) -> Floats:
     """Return a block model's own axes as rows, (3, 3), a right-handed rotation.
+
+    The same angles turn simulated bodies' lattices, variograms and search ellipsoids.
 
     Parameters
     ----------
     bearing : float
-        Compass direction of the model's x axis, degrees clockwise from north (world y): 90, east,
-        is a model that is not turned.
-    dip : float
-        Inclination of the y axis about the x axis, degrees, positive up.
+        Compass direction of the model's y axis, degrees clockwise from north (world y): 0 is a
+        model that is not turned.
     plunge : float
-        Inclination of the x axis from the horizontal, degrees, positive up; applied before dip.
+        Inclination of the y axis, degrees below the horizontal.
+    dip : float
+        Degrees by which the x axis then turns downwards about the y axis.
 
     Raises
     ------
     OptionError
-        Angles that are not finite, or a dip or plunge beyond 90 degrees.
+        Angles that are not finite, or a plunge beyond 90 degrees.
 
     Examples
     --------
-    >>> bool(np.allclose(axes_from_angles(90.0), np.eye(3)))
+    >>> bool(np.allclose(axes_from_angles(0.0), np.eye(3)))
     True
-    >>> bool(np.allclose(axes_from_angles(180.0)[0], [0, -1, 0]))  # the x axis points south
+    >>> bool(np.allclose(axes_from_angles(90.0)[1], [1, 0, 0]))  # the y axis points east
     True
     """
-    angles = np.array([bearing, dip, plunge], dtype=np.float64)
-    if not np.isfinite(angles).all():
-        raise OptionError("bearing, dip and plunge must be finite numbers of degrees")
-    if (np.abs(angles[1:]) > 90).any():
-        raise OptionError(f"dip and plunge must lie within 90 degrees, but are {dip:g}, {plunge:g}")
-    b, d, p = np.deg2rad(angles)
-    x = np.array([np.sin(b) * np.cos(p), np.cos(b) * np.cos(p), np.sin(p)])
-    level = np.array([-np.cos(b), np.sin(b), 0.0])  # y before it dips
-    y = np.cos(d) * level + np.sin(d) * np.cross(x, level)
-    return np.array([x, y, np.cross(x, y)]) + 0.0
+    if not np.isfinite([bearing, plunge, dip]).all():
+        raise OptionError("bearing, plunge and dip must be finite numbers of degrees")
+    if abs(plunge) > 90:
+        raise OptionError(f"a plunge must lie within 90 degrees, but is {plunge:g}")
+    return rotation(bearing, plunge, dip) + 0.0

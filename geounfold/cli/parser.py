@@ -65,8 +65,8 @@ its value, and the mean over the parts is written, with NAME_share, the share of
 one. The summary has the sums of volume times value on both sides.
 
 Sides are columns (XINC, dx, size_x and alike are found) or the steps of the centroids' lattice. Of
-turned models, bearing is the compass direction of the model's own y axis (0: not turned), plunge its
-inclination below the horizontal, and dip how far the x axis turns downwards about it."""
+turned models, bearing is the compass direction of the model's own y axis (0: not turned), plunge
+its inclination below the horizontal, and dip how far the x axis turns downwards about it."""
 _ESTIMATE = """\
 results, by the grade's column, say CU:
   CU_estimate        at the block's centroid, as a point; empty where there is none

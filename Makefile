@@ -3,12 +3,13 @@
 # system libraries that README.md names.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env demo test test-all check format bench soak study notebooks accept clean
+.PHONY: help env demo test test-all check format bench soak study notebooks docs accept clean
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
+DOCS_STAMP := $(VENV)/.docs
 EXTRAS := dev,geostat,notebooks
 ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
@@ -76,11 +77,21 @@ notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each; RU
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py
 	GEOUNFOLD_RUNS=$(RUNS) $(BIN)/python -m pytest --nbmake -n 2 notebooks/*.ipynb $(PYTEST_ARGS)
 
+$(DOCS_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --constraint constraints.txt --editable '.[$(EXTRAS),docs]'
+	@touch $@
+
+docs: $(DOCS_STAMP)  ## build the documentation into site/, its examples run first
+	$(BIN)/python -m pytest -q tests/test_docs.py $(PYTEST_ARGS)
+	NO_MKDOCS_2_WARNING=1 COLUMNS=100 $(BIN)/mkdocs build --strict --quiet
+	@echo "Documentation: $(CURDIR)/site/index.html"
+
 accept: $(STAMP)  ## score the acceptance bodies, where they are present
 	@if [ -f $(ACCEPTANCE)/score.py ]; then $(BIN)/python $(ACCEPTANCE)/score.py; \
 	else echo "no acceptance bodies at $(ACCEPTANCE): nothing scored"; fi
 
 clean:  ## remove the environment, caches and outputs
-	rm -rf $(VENV) demo artefacts build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	rm -rf $(VENV) demo site artefacts build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis \
 	    .import_linter_cache .benchmarks
 	find geounfold tests -name __pycache__ -type d -prune -exec rm -rf {} +

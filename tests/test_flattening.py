@@ -358,6 +358,22 @@ def test_a_rough_first_step_changes_nothing_but_the_time(monkeypatch):
     assert_allclose(rough.uv, exact.uv, atol=1e-9)  # the cap is 1.3 wide
 
 
+def test_springs_come_to_the_same_rest_from_the_plan_and_from_tuttes_embedding():
+    for mesh in (cap(), cylinder()[:2], annulus()):
+        own, given = flatten(mesh), flatten(mesh, start=tutte(mesh))
+        assert own.edge_error[0] < given.edge_error[0]  # the plan is nearer
+        assert own.energy[-1] == pytest.approx(given.energy[-1], rel=1e-10, abs=1e-24)
+        edges = unique_edges(mesh[1])
+        assert_allclose(lengths(own.uv, edges), lengths(given.uv, edges), rtol=1e-8)
+
+
+def test_springs_start_from_tuttes_embedding_where_the_plan_overlaps():
+    mesh = cylinder(n=31, m=5, angle=4.4)[:2]
+    own, given = flatten(mesh), flatten(mesh, start=tutte(mesh))
+    assert own.edge_error[0] == pytest.approx(given.edge_error[0], rel=1e-9)
+    assert own.flips == 0
+
+
 def nearly_closed():
     """A sphere open at a small hole: its springs crumple when they may."""
     S, F = grid(24, 9)

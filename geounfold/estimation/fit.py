@@ -1,8 +1,9 @@
 """Variograms from samples: experimental ones, and a model fitted to them without being asked.
 
 Pairs of samples are binned by how far they lie apart along and across the axes, so that every pair
-counts, whichever way holes run; the model is fitted to the bins by weighted least squares
-(Cressie 1985, Mathematical Geology 17: 563-586).
+counts, whichever way holes run; the model is fitted to the bins by weighted least squares, with
+weights of pairs over the model squared (Cressie 1985, Mathematical Geology 17: 563-586) and over
+the distance squared in units of the ranges, since near samples have the weight in kriging.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ _PAIRS = 10  # fewest pairs of a bin
 _SHARE = 0.5  # of the extent: longest lags
 _NUGGET = 1e-3  # least share of the sill beside a gaussian structure
 _STARTS = (0.15, 0.5)  # ranges to begin with, of the longest lags
+_NEAR = 0.1  # squared ranges within which bins matter alike
 _ROUNDS = 3  # of weights: of equal ones, then of the model so far
 _ROWS = 256  # samples whose pairs are held at a time
 
@@ -307,7 +309,8 @@ def _fitted(
     low, high = np.log(0.02 * longest), np.log(3.0 * longest)
     tries = []
     for start in _STARTS:
-        x, root = np.log(start * longest), np.sqrt(pairs)
+        x = np.log(start * longest)
+        root = np.sqrt(pairs / _fading(H, _STARTS[0] * np.maximum(H.max(axis=0), 1e-300)))
         for _ in range(_ROUNDS):
 
             def residual(x: Floats, root: Floats = root) -> Floats:
@@ -317,7 +320,7 @@ def _fitted(
             x = least_squares(residual, x, bounds=(low, high), diff_step=[1e-4]).x
             nugget, sill, model = _best_sills(H, gamma, root, kind, x, anisotropy)
             model = np.maximum(model, 1e-3 * gamma.mean())
-            root = np.sqrt(pairs) * gamma.mean() / model
+            root = np.sqrt(pairs / _fading(H, _three(np.exp(x), anisotropy))) * gamma.mean() / model
         misfit = float(np.sqrt((pairs * (gamma / model - 1) ** 2).sum() / pairs.sum()))
         tries.append((misfit, nugget, sill, x))
     misfit, nugget, sill, x = min(tries, key=lambda t: t[0])
@@ -326,6 +329,11 @@ def _fitted(
     if nugget + sill <= 0:
         nugget = float(v.var())
     return misfit, kind, nugget, sill, np.exp(x)
+
+
+def _fading(H: Floats, ranges: Floats | Triple) -> Floats:
+    """Return what weights of bins are divided by: far bins have most pairs and matter least."""
+    return np.asarray(_NEAR + ((H / np.asarray(ranges)) ** 2).sum(axis=1))
 
 
 def _best_sills(

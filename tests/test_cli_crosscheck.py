@@ -27,6 +27,8 @@ def test_tables_of_meshes_and_of_blocks(folder, capsys):
     assert main(["crosscheck", "p.csv", *QUICK, "-o", "t.csv", "--differences", "d.csv"]) == 0
     out, err = capsys.readouterr()
     assert (out, err) == ("", "")
+    # Nothing else: fTetWild leaves a file where it runs.
+    assert {path.name for path in folder.iterdir()} == {"p.csv", "t.csv", "d.csv"}
     table = pd.read_csv("t.csv")
     assert table.mesh.tolist() == ["prism", "tetwild"]
     assert (table.volume_difference.abs() < 0.01).all()

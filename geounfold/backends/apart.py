@@ -2,8 +2,7 @@
 
 What such a call does to its process (a crash, a full memory, text on stdout) ends with that
 process and comes back as one BackendError.  Each call has a fresh process, so that what a library
-keeps between calls cannot change the answer, and a folder of its own to work in, which goes with
-it: fTetWild leaves a file where it runs.
+keeps between calls cannot change the answer.
 """
 
 from __future__ import annotations
@@ -104,8 +103,8 @@ def _answer(source: BinaryIO, target: BinaryIO) -> None:
 
 def _search_path() -> str:
     """Return PYTHONPATH, absolute, with the folder that this very package came from in front."""
-    given = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    return os.pathsep.join([_ROOT, *(str(Path(path).resolve()) for path in given if path)])
+    given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
+    return os.pathsep.join([_ROOT, *(str(Path(path).resolve()) for path in given)])
 
 
 def _end(code: int, stderr: bytes) -> str:

@@ -16,7 +16,7 @@ from geounfold.geometry import boundary_faces, tet_volumes
 from geounfold.mesh import TetMesh, TriMesh
 from geounfold.prisms import prism_tets
 from geounfold.verification import PRISM, CrossCheckOptions
-from geounfold.verification._meshes import border, farthest, figures, fill
+from geounfold.verification._meshes import border, farthest, figures, fill, without_unused
 from geounfold.verification._places import Carrier, Follower, border_places
 
 TETGEN = find_spec("tetgen") is not None
@@ -121,6 +121,16 @@ def test_a_mesh_without_inner_vertices_is_its_border():
     for interior in ("harmonic", "arap"):
         found, _ = Follower(TetMesh(V, T), control(V, image, T)).unfolded(interior)
         assert found.V == pytest.approx(image, abs=1e-12)
+
+
+def test_vertices_of_no_tetrahedron_do_not_count():
+    # Control meshes that were mended may have some; to libigl they make the system singular.
+    V = np.concatenate([[[50.0, 50.0, 50.0]], BOX, [[9.0, 9.0, 9.0]]])
+    mesh = without_unused(TetMesh(V, BOX_T + 1))
+    assert mesh.V.tolist() == BOX.tolist()
+    assert mesh.T.tolist() == BOX_T.tolist()
+    found, _ = Follower(mesh, control(V, V @ LINEAR.T, BOX_T + 1)).unfolded("harmonic")
+    assert found.V == pytest.approx(BOX @ LINEAR.T, abs=1e-9)
 
 
 def test_distances_between_borders_are_one_sided():

@@ -19,7 +19,7 @@ from geounfold.errors import BackendError, GeounfoldError, OptionError
 from geounfold.geometry import enclosed_volume, tet_volumes
 from geounfold.mesh import Floats, TetMesh, TriMesh
 from geounfold.methods import PointwiseMap, no_mesh
-from geounfold.verification._meshes import border, figures, fill
+from geounfold.verification._meshes import border, figures, fill, without_unused
 from geounfold.verification._options import INTERIORS, MESHERS, CrossCheckOptions
 from geounfold.verification._places import Carrier, Follower
 from geounfold.verification._result import PRISM, CrossCheck, MeshFigures, PlaceFigures
@@ -143,6 +143,7 @@ class _Run:
                 if name == PRISM
                 else fill(name, self.surface, self._options)
             )
+            mesh = without_unused(mesh)
             found = figures(name, mesh, self.surface, self._frame.scale, seconds)
         except GeounfoldError as error:
             self.meshes.append(MeshFigures(name, error=f"{error}"))

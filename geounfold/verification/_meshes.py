@@ -22,6 +22,12 @@ def border(mesh: TetMesh) -> TriMesh:
     return TriMesh(mesh.V, boundary_faces(mesh.T)[0])
 
 
+def without_unused(mesh: TetMesh) -> TetMesh:
+    """Return a mesh without vertices of no tetrahedron, which no inside could move."""
+    used, T = np.unique(mesh.T, return_inverse=True)
+    return TetMesh(mesh.V[used], T.reshape(-1, 4))
+
+
 def fill(name: str, surface: TriMesh, options: CrossCheckOptions) -> tuple[TetMesh, float]:
     """Return a mesher's tetrahedra inside a closed surface, and the seconds they took.
 

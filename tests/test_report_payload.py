@@ -161,6 +161,7 @@ def test_sub_blocks_have_their_own_sizes_and_hide_each_other():
     corners = lattice(2, 2, 2) - 0.5
     X = np.vstack([parents[~cut], (parents[cut, None] + corners).reshape(-1, 3)])
     size = np.repeat([2.0, 1.0], [18, 72])
+    assert block_shape(X, dict.fromkeys(("dx", "dy", "dz", "xinc", "yinc", "zinc"), size)) is None
     shape = block_shape(X, {"DIM_X": size, "dim_y": size, "dim_z": [str(s) for s in size]})
     np.testing.assert_array_equal(shape.sizes, np.column_stack([size] * 3))
     hidden = X[~outer_blocks(X, shape)]

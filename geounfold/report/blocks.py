@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
+from geounfold.blockmodel.sizes import size_columns
+from geounfold.errors import InputError
 from geounfold.lattice import measure_lattice, point_spacing
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.plotting import block_sides
@@ -21,7 +23,6 @@ _SEED = 20_261_124
 _MAX_CELLS = 30_000_000  # of the grid that inner blocks are found with: 30 MB
 _INSIDE_SHARE = 0.2  # of the blocks drawn at least, so that slices of large bodies are not empty
 _LOOSE = 0.001  # how much a gradient is held to a rotation, which sheets of one block need
-_SIDES = ("dim_x", "dim_y", "dim_z")
 _SPARSE = 1.3  # typical spacing over the lattice's step from which blocks are larger than steps
 _FINEST = 8  # sub-blocks along a side that are told apart
 _TORN = 2.5  # neighbours that move apart by this factor are none
@@ -54,8 +55,8 @@ def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | Non
     points : (n, 3) float
         Centroids.
     columns : mapping of str to (n,)
-        Where they hold ``dim_x``, ``dim_y``, ``dim_z`` (in any letter case), all above 0, these are
-        the blocks' sides along the lattice's axes.
+        Where they hold one set of sides (``XINC``, ``dim_x`` ...: see `size_columns`), all above 0,
+        these are the blocks' along the lattice's axes.
 
     Examples
     --------
@@ -75,10 +76,13 @@ def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | Non
 
 def _sizes(columns: Mapping[str, ArrayLike], count: int) -> Floats | None:
     """Return the sides of blocks that stand in a table, (n, 3); None where they do not."""
-    known = {str(name).lower(): values for name, values in columns.items()}
-    if not all(name in known for name in _SIDES):
+    try:
+        names = size_columns([str(name) for name in columns])
+    except InputError:  # several sets of sides: none is known to be the blocks'
         return None
-    read, _ = read_columns({name: known[name] for name in _SIDES}, count, "")
+    if names is None:
+        return None
+    read, _ = read_columns({name: columns[name] for name in names}, count, "")
     if len(read) < 3 or any(column.categories for column in read):
         return None
     sizes = np.column_stack([column.values for column in read]).astype(np.float64)

@@ -33,7 +33,7 @@ GRADIENT_STEP = 1 / 4096
 MOST_POINTS = 20_000
 """Points of traces, and of samples, that a report holds at most."""
 
-_ROOM = 3_800_000  # bytes for the values of columns, before base64
+_ROOM = 3_600_000  # bytes for the values of columns, before base64
 _SAMPLE_COLUMNS = 12
 _SEED = 20_261_125
 _RESULTS = "Results"
@@ -147,7 +147,7 @@ def payload(
             f"{len(chosen):,} of {len(folded):,} blocks are held for the turning views, chosen at "
             "random (the same ones each time), outer ones before inner ones: "
             f"{drawn:,} of {shown:,} outer blocks"
-            f"{', drawn larger to close the gaps' if drawn < shown else ''}. "
+            f"{', drawn larger as others are missing' if drawn < shown else ''}. "
             "Figures and distributions are of all."
         )
     total = len(folded) if total is None else total

@@ -25,6 +25,7 @@ from geounfold.control import ControlMesh
 from geounfold.errors import HullError, InputError, MissingDependencyError
 from geounfold.frame import Frame
 from geounfold.mesh import TetMesh
+from geounfold.methods import METHODS
 from geounfold.report import CarriedHoles, CarriedPoints
 
 COMMANDS = ["unfold", "map", "estimate", "compare", "crosscheck", "quality", "simulate"]
@@ -32,6 +33,7 @@ COMMANDS += ["view", "grid", "transfer", "init", "doctor", "completion"]
 SHIFT = np.array([1000.0, 0.0, -5.0])
 PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
 RESULTS = [*PLACE, "location", "mesh_distance"]
+assert METHODS  # loaded before the tests put fakes in the place of what it builds on
 
 
 class FakeMap:

@@ -167,10 +167,10 @@ def _row(
     clocks = time.perf_counter(), time.process_time()
     try:
         u = unfold(points, options, progress=progress)
+        row |= _since(clocks)
+        return {**row, **_of_blocks(u, truth, simulated), **_of_surface(u)}
     except GeounfoldError as error:
-        return {**row, **_since(clocks), "error": f"{error}"}
-    row |= _since(clocks)
-    return {**row, **_of_blocks(u, truth, simulated), **_of_surface(u)}
+        return {**_since(clocks), **row, "error": f"{error}"}
 
 
 def _since(clocks: tuple[float, float]) -> dict[str, float]:
@@ -213,6 +213,9 @@ def _of_surface(u: Unfolding) -> dict[str, Any]:
     V, F, uv = pair.folded.V, pair.folded.F, np.ascontiguousarray(pair.unfolded.V[:, :2])
     if not len(F):
         raise InputError("no part of the reference surface has an image")
+    a, b = uv[F[:, 1]] - uv[F[:, 0]], uv[F[:, 2]] - uv[F[:, 0]]
+    if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() < 0:  # turned over with its body
+        F = np.ascontiguousarray(F[:, ::-1])
     return {
         "area_error": measures.area_error(V, F, uv),
         "edge_strain": measures.edge_strain(V, F, uv),

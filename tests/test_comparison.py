@@ -132,6 +132,14 @@ def test_methods_are_compared_on_whole_bodies(fold):
     assert table.stratigraphic_error[2] == pytest.approx(off)
 
 
+def test_a_body_turned_over_is_measured_from_the_side_it_looks_to(fold):
+    how = UnfoldOptions(up=(0.0, 0.0, -1.0))
+    for options in (UnfoldOptions(), how):
+        table = compare(fold, methods="sheet", unfolding=options)
+        assert (table.flips[0], table.overlaps[0]) == (0, 0)
+        assert table.symmetric_dirichlet[0] < 4.001
+
+
 def test_a_method_that_fails_is_a_row_that_says_why():
     body = simulate("recumbent", blocks=3000)
     table = compare({"overturned": body.folded}, methods=["thesis", "shear"])

@@ -1,6 +1,6 @@
 """Table of methods: ours against every other on simulated bodies that can be laid flat exactly.
 
-    python tests/benchmarks/methods.py [NAME ...] [-o TABLE.csv] [--blocks N]
+    python tests/benchmarks/methods.py [NAME ...] [-o TABLE.csv] [--blocks N] [--methods A,B]
     python tests/benchmarks/methods.py --peer FOLDER [-o PEER.csv]
     python tests/benchmarks/methods.py --show TABLE.csv
 
@@ -35,12 +35,12 @@ def say(text):
     sys.stdout.flush()
 
 
-def rows(name, blocks):
+def rows(name, blocks, methods):
     """Return one body's rows; None where it has no exact flat image."""
     body = gu.simulate(name, blocks=blocks)
     if not body.developable:
         return None
-    table = compare_methods(body)
+    table = compare_methods(body, methods)
     for column in table.select_dtypes("float"):
         table[column] = [float(f"{value:.4g}") for value in table[column]]
     return table
@@ -62,8 +62,9 @@ def markdown(table):
     yield f"|{'---|' * (len(others) + 5)}"
     for body, part in table.groupby("body", sort=False):
         part = part.set_index("method")
-        ours, best = part.rms["sheet"], part.rms[others].astype(float).min()
-        cells = ["-" if pd.isna(v) else f"{v:.3f}" for v in part.rms[["sheet", *others]]]
+        rms = part.rms.astype(float).reindex(["sheet", *others])
+        ours, best = rms["sheet"], rms[others].min()
+        cells = ["-" if pd.isna(v) else f"{v:.3f}" for v in rms]
         nothing = part.rms_nothing.dropna().iloc[:1].map("{:.2f}".format).sum()
         margin = "-" if pd.isna(ours) else f"{best / ours:.1f}"
         yield f"| {body} | {part.blocks.iloc[0]:,} | {nothing} | {' | '.join(cells)} | {margin} |"
@@ -113,6 +114,7 @@ def main():
     parser.add_argument("names", metavar="NAME", nargs="*", help="bodies; all without")
     parser.add_argument("-o", "--output", help="a CSV table to put the rows into")
     parser.add_argument("--blocks", type=int, metavar="N", help="cut bodies to about N")
+    parser.add_argument("--methods", metavar="A,B", help="all without")
     parser.add_argument("--peer", type=Path, metavar="FOLDER", help="Unfolding.jl's test data")
     parser.add_argument("--show", metavar="TABLE.csv", help="print a table as Markdown")
     args = parser.parse_args()
@@ -125,7 +127,7 @@ def main():
             table.to_csv(args.output, index=False)
         return 0
     for name in args.names or [name for name in CASES if name not in LARGE]:
-        table = rows(name, args.blocks)
+        table = rows(name, args.blocks, args.methods.split(",") if args.methods else "all")
         if table is None:
             continue
         say("\n".join(list(markdown(table))[2:]))

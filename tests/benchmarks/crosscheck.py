@@ -46,7 +46,7 @@ def load(name, shared, width):
     folded = read_points(str(path)).points
     frame = pd.read_csv(path)
     truth = frame[list(TRUE)].to_numpy() if set(TRUE) <= set(frame.columns) else None
-    return folded, truth, bool(index[case]["developable"])
+    return folded, truth, bool(index[case].get("developable", False))
 
 
 def rows(name, shared, width, seconds):

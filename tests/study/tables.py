@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,9 +25,8 @@ FIGURES = (
 )
 
 
-def shares(table: pd.DataFrame) -> dict[str, float]:
-    """Return gain and share of the possible gain of arms, from mean RMSEs."""
-    rmse = {arm: float(table.loc[table.arm == arm, "rmse"].mean()) for arm in ARMS}
+def shares(rmse: dict[str, Any]) -> dict[str, Any]:
+    """Return gain and share of the possible gain of arms, from mean RMSEs: numbers or arrays."""
     best, ceiling = rmse["folded_best"], rmse["truth"]
     out = {f"gain {arm}": 1 - rmse[arm] / best for arm in ("stratigraphic", "geounfold", "truth")}
     for arm in ("stratigraphic", "geounfold"):
@@ -34,19 +34,22 @@ def shares(table: pd.DataFrame) -> dict[str, float]:
     return out
 
 
+def means(table: pd.DataFrame) -> dict[str, float]:
+    """Return the mean RMSE of each arm."""
+    return {arm: float(table.loc[table.arm == arm, "rmse"].mean()) for arm in ARMS}
+
+
 def intervals(table: pd.DataFrame) -> pd.DataFrame:
     """Return each of `shares` with the bounds between which 95 % of its bootstrap draws lie."""
     sums = table.pivot_table(index="seed", columns="arm", values="rmse", aggfunc="sum")
-    counts = table[table.arm == "truth"].groupby("seed").size()
-    rng = np.random.default_rng(0)
-    draws = []
-    for _ in range(DRAWS):
-        some = rng.choice(sums.index, len(sums))
-        mean = sums.loc[some].sum() / counts.loc[some].sum()
-        rows = pd.DataFrame({"arm": list(ARMS), "rmse": [mean[a] for a in ARMS]})
-        draws.append(shares(rows))
-    spread = pd.DataFrame(draws).quantile([0.025, 0.975])
-    return pd.DataFrame({"value": shares(table), "low": spread.iloc[0], "high": spread.iloc[1]})
+    counts = table[table.arm == "truth"].groupby("seed").size().to_numpy()
+    draw = np.random.default_rng(0).integers(0, len(sums), (DRAWS, len(sums)))
+    drawn = {arm: sums[arm].to_numpy()[draw].sum(axis=1) / counts[draw].sum(axis=1) for arm in ARMS}
+    rows = {
+        name: (value, *np.quantile(shares(drawn)[name], [0.025, 0.975]))
+        for name, value in shares(means(table)).items()
+    }
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "low", "high"])
 
 
 def by_arm(table: pd.DataFrame) -> pd.DataFrame:
@@ -86,7 +89,7 @@ def report(table: pd.DataFrame) -> str:
     rows = {}
     for key, part in table.groupby(["field", "body", "spacing"]):
         rows[key] = {
-            **shares(part),
+            **shares(means(part)),
             "rmse folded_best": part[part.arm == "folded_best"].rmse.mean(),
         }
     text += ["## By body and spacing\n", markdown(pd.DataFrame(rows).T)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -22,6 +23,8 @@ MIN_POINTS = 50
 SPECK_SHARE = 0.005
 """A body with a smaller share of the points is a speck."""
 
+_MIXED = np.array([1.0, np.sqrt(2) / 2, np.pi / 6])  # different rows hardly ever share a sum
+_EMPTY = 32  # cells of a box per block, up to which parts are told in an array of all
 _FLAT = 0.05  # extent, in point spacings, below which points lie on a line or plane
 _SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
 _MARGIN = 2  # blocks, the farthest neighbours that are looked up
@@ -59,7 +62,13 @@ def count_duplicates(points: Floats) -> int:
     >>> count_duplicates(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0]]))
     2
     """
-    return len(points) - len(distinct(points))
+    key = points[:, 0] * _MIXED[0] + points[:, 1] * _MIXED[1] + points[:, 2] * _MIXED[2]
+    ordered = np.sort(key)
+    same = ordered[1:][ordered[1:] == ordered[:-1]]
+    if not len(same):  # equal rows have equal keys
+        return 0
+    some = points[np.isin(key, same)]
+    return len(some) - len(distinct(some))
 
 
 def check_points(points: Floats, lattice: Lattice | None = None) -> None:
@@ -79,14 +88,17 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
         surface and not on a lattice.  A folded sheet of one layer of blocks has a top and a
         bottom, as its blocks have.
     """
-    X = distinct(points)
-    _check_count(X, len(points))
-    _check_extent(X)
+    count = len(points) - count_duplicates(points)
+    _check_count(count, len(points))
     if lattice is None:
-        lattice = measure_lattice(X)
-    cells = None if lattice is None else _Cells.of(lattice_indices(X, lattice))
-    loose = cells is None or cells.gappy()
-    if loose and _one_layer_of_points(X) and not _in_three_directions(X):
+        _check_extent(points, count, point_spacing(points))
+        lattice = measure_lattice(distinct(points))
+    else:
+        _check_extent(points, count, float(np.cbrt(lattice.steps.prod())))
+    if lattice is not None and not _Cells.of(lattice_indices(points, lattice)).gappy():
+        return
+    X = distinct(points)
+    if _one_layer_of_points(X) and not _in_three_directions(X):
         raise InputError(
             f"the {len(X)} points lie on one surface, on no lattice of touching blocks: a sheet "
             "one block thick, and nothing tells how thick a block is; give at least two layers "
@@ -201,23 +213,26 @@ def _listed(bodies: Sequence[Body], most: int = 10) -> str:
     return ", ".join(named)
 
 
-def _check_count(X: Floats, rows: int) -> None:
-    if len(X) < MIN_POINTS:
-        same = f" ({rows} rows with duplicates)" if rows > len(X) else ""
+def _check_count(count: int, rows: int) -> None:
+    if count < MIN_POINTS:
+        same = f" ({rows} rows with duplicates)" if rows > count else ""
         raise InputError(
-            f"only {len(X)} distinct points{same}, but a body needs at least {MIN_POINTS}; "
+            f"only {count} distinct points{same}, but a body needs at least {MIN_POINTS}; "
             "give the centroids of all its blocks"
         )
 
 
-def _check_extent(X: Floats) -> None:
-    """Raise when the points' extents across their main directions are (nearly) nothing."""
-    limit = _FLAT * point_spacing(X)
+def _check_extent(X: Floats, count: int, spacing: float) -> None:
+    """Raise when the points' extents across their main directions are (nearly) nothing.
+
+    So many of them are distinct, and they lie about so far apart.
+    """
+    limit = _FLAT * spacing
     constant = np.ptp(X, axis=0) < limit
     if constant.sum() == 2:
         fixed = " and ".join(f"{'xyz'[i]} = {X[0, i]:.10g}" for i in np.flatnonzero(constant))
         raise InputError(
-            f"all {len(X)} points are in one column ({fixed}); "
+            f"all {count} points are in one column ({fixed}); "
             "give a body that extends in all three directions"
         )
     centred = X - X.mean(axis=0)
@@ -225,11 +240,11 @@ def _check_extent(X: Floats) -> None:
     across, second = np.ptp(along[:, 0]), np.ptp(along[:, 1])
     if second < limit:
         raise InputError(
-            f"all {len(X)} points are on one line; give a body that extends in all three directions"
+            f"all {count} points are on one line; give a body that extends in all three directions"
         )
     if across < limit:
         raise InputError(
-            f"all {len(X)} points are in one plane, so nothing tells how thick the body is (and "
+            f"all {count} points are in one plane, so nothing tells how thick the body is (and "
             "it is unfolded already); give at least two layers of blocks"
         )
 
@@ -241,6 +256,7 @@ class _Cells:
     keys: Ints  # (m,) sorted
     strides: Ints  # (3,) key of one step along each axis
     cell: Ints  # (n,) distinct cell of each input row
+    shape: Ints  # (3,) cells of the box that the keys count
 
     @classmethod
     def of(cls, indices: Ints) -> _Cells:
@@ -249,13 +265,23 @@ class _Cells:
         size = indices.max(axis=0) - low + 1 + _MARGIN
         strides = np.array([size[1] * size[2], size[2], 1], dtype=np.int64)
         keys, cell = np.unique((indices - low) @ strides, return_inverse=True)
-        return cls(keys, strides, cell)
+        return cls(keys, strides, cell, size)
 
     def find(self, which: Ints, offset: Sequence[int]) -> Ints:
         """Return the cell at an offset from each of some cells; -1 where it is empty."""
         wanted = self.keys[which] + int(np.dot(offset, self.strides))
         place = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
         out: Ints = np.where(self.keys[place] == wanted, place, -1)
+        return out
+
+    def labelled(self) -> Ints | None:
+        """Return the face-connected part of each cell, (m,); None where the box is too empty."""
+        if float(np.prod(self.shape.astype(float))) > _EMPTY * len(self.keys):
+            return None
+        held = np.zeros(int(self.shape.prod()), dtype=bool)
+        held[self.keys] = True
+        labels = ndimage.label(held.reshape(self.shape))[0].ravel()
+        out: Ints = labels.take(self.keys).astype(np.int64) - 1
         return out
 
     def sample(self) -> Ints:
@@ -340,6 +366,9 @@ def _connected_cells(cells: _Cells) -> Ints:
     components (an edge between two components has such an end), and not from inner ones.
     """
     every = np.arange(len(cells.keys))
+    labels = cells.labelled()
+    if labels is not None and labels.max() == 0:
+        return labels
     found = [cells.find(every, offset) for offset in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     first = np.concatenate([every[other >= 0] for other in found])
     second = np.concatenate([other[other >= 0] for other in found])

@@ -69,7 +69,12 @@ class Carried:
     @property
     def location(self) -> np.ndarray:
         """``inside``, ``extrapolated`` or ``outside`` (no image) for every point, (n,) of str."""
-        return np.where(self.placed, np.where(self.inside, INSIDE, EXTRAPOLATED), OUTSIDE)
+        words = np.array([OUTSIDE, EXTRAPOLATED, INSIDE])
+        return words[self.placed * (1 + self.inside.astype(np.int8))]
+
+    def part(self, rows: slice) -> Carried:
+        """Return what became of some of the points."""
+        return Carried(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)

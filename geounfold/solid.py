@@ -11,16 +11,18 @@ that blocks surround are taken for missing blocks and filled.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geounfold.geometry import sorted_distinct
 from geounfold.lattice import Lattice
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.mesh import Bools, Floats, Ints, Numbers
 
 MOST_CELLS = 250_000
 """Cells beyond which parents are filled by coarser ones; about ten seconds' work."""
@@ -41,6 +43,7 @@ Measured: 8 to 14 in sheets of one block and to 17 in a block and a half, whose 
 edges and which so have parts and corners of their own; 17 to 20 in two, 17 with 5 % missing.
 """
 
+_EMPTY = 32  # cells of a box per block, up to which each is looked up in a table of all
 _LARGE = 0.01  # share of the blocks from which a part of the body counts
 _ROUNDS = 2  # of filling: more would run along a gap from its end, where a place has 21
 _DOUBLINGS = 5  # of the finest side, tried for the parents' side
@@ -128,7 +131,14 @@ def _aligned_gap(q: Ints, axis: int) -> Ints:
     Zero where there is none.
     """
     others = [i for i in range(3) if i != axis]
-    order = np.lexsort((q[:, axis], q[:, others[1]], q[:, others[0]]))
+    first, last = (q[:, [*others, axis]].min(axis=0), q[:, [*others, axis]].max(axis=0))
+    size = (last - first + 1).astype(float)
+    if size.prod() < 2.0**62:
+        a, b, c = ((q[:, k] - f) for k, f in zip([*others, axis], first, strict=True))
+        shape = last - first + 1
+        order = np.argsort((a * shape[1] + b) * shape[2] + c, kind="stable")
+    else:
+        order = np.lexsort((q[:, axis], q[:, others[1]], q[:, others[0]]))
     line = q[order]
     step = np.diff(line, axis=0)
     same = (step[:, others] == 0).all(axis=1) & (step[:, axis] > 0)
@@ -259,7 +269,7 @@ def _with_missing(
 
 def _missing(cells: Ints) -> Ints:
     """Return the places of blocks that are missing at random or in a slab, (m, 3)."""
-    if _usual(cells) < FEWEST:
+    if _usual(_Cells.of(cells)) < FEWEST:
         return np.zeros((0, 3), np.int64)
     alone = surrounded(cells)
     cells = np.concatenate([cells, alone])
@@ -268,6 +278,94 @@ def _missing(cells: Ints) -> Ints:
         return alone
     rest = surrounded(np.concatenate([cells, slab]))
     return np.concatenate([alone, slab, rest])
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Occupied cells as sorted distinct keys, and which keys are among them.
+
+    Attributes
+    ----------
+    keys : (n,) int
+        Of the cells, sorted.
+    low : (3,) int
+        The cell of key 0.
+    shape : (3,) int
+        Cells of the box along each axis, a margin included.
+    """
+
+    keys: Ints
+    low: Ints
+    shape: Ints
+
+    @classmethod
+    def of(cls, cells: Ints, margin: int = 3) -> _Cells:
+        """Return the cells (n, 3) with so many empty ones around."""
+        low = cells.min(axis=0) - margin
+        shape = cells.max(axis=0) - low + 1 + margin
+        stride = np.array([shape[1] * shape[2], shape[2], 1])
+        return cls(sorted_distinct((cells - low) @ stride), low, shape)
+
+    def with_keys(self, keys: Ints) -> _Cells:
+        """Return these and further cells of the same box."""
+        return _Cells(sorted_distinct(np.concatenate([self.keys, keys])), self.low, self.shape)
+
+    @property
+    def stride(self) -> Ints:
+        """The key of one step along each axis, (3,)."""
+        return np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
+
+    @property
+    def around(self) -> list[int]:
+        """What the keys of a cell's 26 neighbours are away from its own."""
+        return [int(np.array(o) @ self.stride) for o in product((-1, 0, 1), repeat=3) if any(o)]
+
+    @cached_property
+    def table(self) -> Bools | None:
+        """Whether each key of the box is occupied; None where the box is far larger than that."""
+        count = int(self.shape.prod())
+        if count > _EMPTY * len(self.keys):
+            return None
+        table = np.zeros(count, dtype=bool)
+        table[self.keys] = True
+        return table
+
+    def held(self, wanted: Ints) -> Bools:
+        """Return which keys (m,) are occupied."""
+        if self.table is not None:
+            return np.asarray(self.table.take(wanted))
+        at = np.minimum(np.searchsorted(self.keys, wanted), len(self.keys) - 1)
+        out: Bools = self.keys[at] == wanted
+        return out
+
+    def neighbours(self, keys: Ints) -> Numbers:
+        """Return how many of the 26 cells around each are occupied, (m,)."""
+        count = np.zeros(len(keys), dtype=np.int32)
+        for step in self.around:
+            count += self.held(keys + step)
+        return count
+
+    def parts(self) -> Ints:
+        """Return the face-connected part of each cell, (n,)."""
+        if self.table is not None:
+            labels = ndimage.label(self.table.reshape(self.shape))[0].ravel()
+            out: Ints = labels.take(self.keys).astype(np.int64) - 1
+            return out
+        first, second = [], []
+        for step in self.stride.tolist():
+            held = self.held(self.keys + step)
+            first.append(np.flatnonzero(held))
+            second.append(np.searchsorted(self.keys, self.keys[held] + step))
+        ends = (np.concatenate(first), np.concatenate(second))
+        graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(len(self.keys),) * 2)
+        found: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
+        return found
+
+    def places(self, keys: Ints) -> Ints:
+        """Return the cells of keys, (m, 3)."""
+        i, rest = np.divmod(keys, self.stride[0])
+        j, k = np.divmod(rest, self.stride[1])
+        return np.stack([i, j, k], axis=1) + self.low
 
 
 def parting(cells: Ints) -> Ints:
@@ -281,18 +379,15 @@ def parting(cells: Ints) -> Ints:
     cells : (n, 3) int
         Lattice cell of every block.
     """
-    low = cells.min(axis=0) - 3
-    shape = cells.max(axis=0) - low + 4
-    stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = sorted_distinct((cells - low) @ stride)
-    part = _parts(keys, stride)
+    filled = _Cells.of(cells)
+    keys, part = filled.keys, filled.parts()
     sizes = np.bincount(part)
     if (sizes >= _LARGE * len(keys)).sum() < 2:
         return np.zeros((0, 3), np.int64)
     part = np.where(sizes[part] >= _LARGE * len(keys), part, -1)
     found, joined = [np.zeros(0, np.int64)], np.zeros(0, np.int64)
     for width in (1, 2):
-        for step in stride.tolist():
+        for step in filled.stride.tolist():
             at = np.searchsorted(keys, keys + (width + 1) * step)
             at = np.minimum(at, len(keys) - 1)
             across = (keys[at] == keys + (width + 1) * step) & (part[at] != part)
@@ -303,27 +398,7 @@ def parting(cells: Ints) -> Ints:
             across &= np.isin(pair, joined)
             found += [keys[across] + i * step for i in range(1, width + 1)]
     between = sorted_distinct(np.concatenate(found))
-    out: Ints = _places(between[~_held(between, keys)], stride) + low
-    return out
-
-
-def _parts(keys: Ints, stride: Ints) -> Ints:
-    """Return the face-connected part of each cell, given by sorted keys, (n,)."""
-    first, second = [], []
-    for step in stride.tolist():
-        held = _held(keys + step, keys)
-        first.append(np.flatnonzero(held))
-        second.append(np.searchsorted(keys, keys[held] + step))
-    ends = (np.concatenate(first), np.concatenate(second))
-    graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(len(keys),) * 2)
-    out: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
-    return out
-
-
-def _places(keys: Ints, stride: Ints) -> Ints:
-    i, rest = np.divmod(keys, stride[0])
-    j, k = np.divmod(rest, stride[1])
-    return np.stack([i, j, k], axis=1)
+    return filled.places(between[~filled.held(between)])
 
 
 def surrounded(cells: Ints) -> Ints:
@@ -334,39 +409,20 @@ def surrounded(cells: Ints) -> Ints:
     cells : (n, 3) int
         Lattice cell of every block.
     """
-    low, stride, keys, steps = _keyed(cells)
-    added, fresh = [np.zeros(0, np.int64)], keys
+    filled = _Cells.of(cells)
+    added, fresh = [np.zeros(0, np.int64)], filled.keys
     for _ in range(_ROUNDS):
-        least = max(SURROUNDED * _usual(_places(keys, stride)) / len(steps), FEWEST)
-        beside = np.concatenate([part[~_held(part, keys)] for part in (fresh + s for s in steps)])
-        place = sorted_distinct(beside)
-        count = np.sum([_held(place + s, keys) for s in steps], axis=0)
-        fresh = place[count >= least]
+        least = max(SURROUNDED * _usual(filled) / len(filled.around), FEWEST)
+        beside = [part[~filled.held(part)] for part in (fresh + s for s in filled.around)]
+        place = sorted_distinct(np.concatenate(beside))
+        fresh = place[filled.neighbours(place) >= least]
         if not len(fresh):
             break
         added.append(fresh)
-        keys = sorted_distinct(np.concatenate([keys, fresh]))
-    out: Ints = _places(np.concatenate(added), stride) + low
-    return out
+        filled = filled.with_keys(fresh)
+    return filled.places(np.concatenate(added))
 
 
-def _keyed(cells: Ints) -> tuple[Ints, Ints, Ints, list[int]]:
-    """Return the least cell, the keys' strides, the cells' sorted keys, and a neighbour's steps."""
-    low = cells.min(axis=0) - 2
-    shape = cells.max(axis=0) - low + 3
-    stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = sorted_distinct((cells - low) @ stride)
-    steps = [int(np.array(o) @ stride) for o in product((-1, 0, 1), repeat=3) if any(o)]
-    return low, stride, keys, steps
-
-
-def _usual(cells: Ints) -> float:
+def _usual(filled: _Cells) -> float:
     """Return the upper quartile of the number of blocks among a block's 26 neighbours."""
-    _, _, keys, steps = _keyed(cells)
-    return float(np.percentile(np.sum([_held(keys + s, keys) for s in steps], axis=0), 75))
-
-
-def _held(wanted: Ints, keys: Ints) -> Bools:
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    out: Bools = keys[at] == wanted
-    return out
+    return float(np.percentile(filled.neighbours(filled.keys), 75))

@@ -42,13 +42,15 @@ class FakeMap:
     def carry(self, points: np.ndarray, *, inverse: bool = False) -> SimpleNamespace:
         location = np.where(points[:, 0] < 0, "extrapolated", "inside")
         image = points - SHIFT if inverse else points + SHIFT
-        return SimpleNamespace(
+        carried = SimpleNamespace(
             points=image,
             stratigraphic=points[:, 2] / 10,
             location=location,
             distance=np.maximum(-points[:, 0], 0),
             unsolved=0,
         )
+        carried.part = lambda rows: carried if rows == slice(0, len(points)) else None
+        return carried
 
 
 class Given(dict[str, Any]):

@@ -45,7 +45,7 @@ def test_sheets_and_rows_of_one_block(shape):
     got = lattice_epsilon(points, folded, cells, np.ones(3), 26)
     # A tree takes any of equally near blocks; measured: 0.06 off in the cube, half of whose blocks
     # lie at its surface.
-    assert got.mean() == pytest.approx(epsilon(points, folded).mean(), rtol=0.1)
+    assert got.mean() == pytest.approx(epsilon(points, folded).mean(), rel=0.1)
     assert np.isfinite(got).all()
 
 

@@ -35,13 +35,15 @@ class FakeMap:
 
     def carry(self, points: np.ndarray, *, inverse: bool = False) -> SimpleNamespace:
         words = np.where(points[:, 0] < -5, "outside", "extrapolated")
-        return SimpleNamespace(
+        carried = SimpleNamespace(
             points=points - SHIFT if inverse else points + SHIFT,
             stratigraphic=points[:, 2],
             location=np.where(points[:, 0] < 0, words, "inside"),
             distance=np.maximum(-points[:, 0], 0),
             unsolved=0,
         )
+        carried.part = lambda rows: carried if rows == slice(0, len(points)) else None
+        return carried
 
 
 class FakeUnfolding(FakeMap):

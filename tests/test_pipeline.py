@@ -144,7 +144,7 @@ def test_summary_is_json_and_holds_the_promised_keys(swelling):
     )
     assert set(promised.split()) <= set(summary)
     assert {"faces", "volume", "closed", "manifold"} <= set(summary["hull"])
-    assert set(summary["nmd"]) == {"mean", "std", "p95", "max"}
+    assert set(summary["nmd"]) == {"mean", "std", "p95", "max", "sample", "standard_error"}
     hull = summary["hull"]
     assert hull["volume"] == pytest.approx(hull["blocks_volume"], rel=0.1)
     assert "epsilon" in repr(u)

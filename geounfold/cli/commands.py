@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from argparse import Namespace
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -31,10 +32,12 @@ from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
+    from geounfold.io.streams import PointStream
     from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Bools, Floats, TriMesh
     from geounfold.methods import PointwiseMap
     from geounfold.options import UnfoldOptions
+    from geounfold.pipeline import Unfolding
 
 _POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
 _SURFACES_OUT = surface_endings(writing=True)
@@ -76,7 +79,7 @@ def unfold(args: Namespace, console: Console) -> None:
         _check_pictures(console)
     options = _options(args)
     _check_mesh_outputs(args, options)
-    table = _read(args.points, args, console)
+    table = _open(args, console, args.output, whole=args.report is not None)
     table.check_writable(args.output)
     samples = _read_samples(args, console)
     holes = read_holes(args, console)
@@ -95,7 +98,6 @@ def unfold(args: Namespace, console: Console) -> None:
     warnings = summary.get("warnings", [])
     if samples is not None:
         summary["samples"] = samples.facts()
-    columns = result_columns(UNFOLDED, result.carried) | result.columns
     carried = (
         None if samples is None else result_columns(UNFOLDED, result.map.carry(samples.points))
     )
@@ -105,7 +107,7 @@ def unfold(args: Namespace, console: Console) -> None:
         summary["warnings"] = [*warnings, *holes.holes.messages()]  # said when they were read
     console.stage("writing")
     with outputs.writing() as parts:
-        table.write(parts["--output"], columns)
+        table.write_parts(parts["--output"], lambda _, rows: _results(result, rows))
         if samples is not None and carried is not None:
             samples.write(parts["--samples-out"], carried)
         if holes is not None:
@@ -119,10 +121,11 @@ def unfold(args: Namespace, console: Console) -> None:
             write_control(parts["--mesh"], mapped, result.certificate)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
-        if "--report" in parts:
+        if "--report" in parts and isinstance(table, PointTable):  # which it is, read whole
             from geounfold.cli.reporting import report_columns, report_holes
             from geounfold.report import write_report
 
+            columns = _results(result, slice(0, len(table)))
             drawn = report_columns(table, columns)
             drilled = report_holes(holes, traced, samples, carried)
             blocks = table.points, result.points
@@ -130,9 +133,9 @@ def unfold(args: Namespace, console: Console) -> None:
     for warning in warnings:
         console.warn(str(warning))
     if carried is not None:
-        _warn_of_outside(args.samples, carried, console)
-    for name, columns in traced.items():
-        _warn_of_outside(f"the holes' {name}", columns, console)
+        _warn_of_outside(args.samples, _places(carried), console)
+    for name, found in traced.items():
+        _warn_of_outside(f"the holes' {name}", _places(found), console)
     console.done(f"{len(table)} points unfolded into {args.output}")
     console.answer(summary)
 
@@ -145,6 +148,12 @@ def _check_mesh_outputs(args: Namespace, options: UnfoldOptions) -> None:
         for path, name in ((args.map, "--map"), (args.mesh, "--mesh")):
             if path is not None:
                 raise OptionError(no_mesh(options.method, f"{name} has nothing to write"))
+
+
+def _results(result: Unfolding, rows: slice) -> dict[str, Any]:
+    """Return all results of some of the points, by output column."""
+    distortion = {name: values[rows] for name, values in result.columns.items()}
+    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion
 
 
 def carry(args: Namespace, console: Console) -> None:
@@ -173,39 +182,44 @@ def carry(args: Namespace, console: Console) -> None:
         _carry_surface(args, console, outputs)
         return
     prefer = (UNFOLDED,) if args.inverse else ()
-    table = None if args.points is None else _read(args.points, args, console, prefer=prefer)
+    table = None if args.points is None else _open(args, console, args.output, prefer, keep=False)
     holes = read_holes(args, console)
     from geounfold import mapping
 
     saved = mapping.load(args.map)
     console.stage("carrying points")
-    columns: dict[str, Any] = {}
-    unsolved = 0
-    if table is not None and args.inverse:
-        back = saved.carry(table.points, inverse=True)
-        columns, unsolved = result_columns(FOLDED, back), back.unsolved
-    elif table is not None:
-        columns = result_columns(UNFOLDED, saved.carry(table.points))
+    names = FOLDED if args.inverse else UNFOLDED
+    places: Counter[str] = Counter()
+    unsolved: list[int] = []
+
+    def carried(points: Floats, _: slice) -> dict[str, Any]:
+        there = saved.carry(points, inverse=args.inverse)
+        found = result_columns(names, there)
+        places.update(_places(found))
+        unsolved.append(there.unsolved if args.inverse else 0)
+        return found
+
     traced = {} if holes is None else holes.carried(_flat(saved))
     with outputs.writing() as parts:
         if table is not None:
-            table.write(parts["--output"], columns)
+            table.write_parts(parts["--output"], carried)
         if holes is not None:
             holes.write(parts, traced)
+    named = {name: _places(found) for name, found in traced.items() if found}
     if table is not None:
-        _warn_of_outside(args.points, columns, console)
-    if unsolved:
+        named = {"points": dict(places), **named}
+        _warn_of_outside(args.points, named["points"], console)
+    if sum(unsolved):
         console.warn(
-            f"{args.points}: {unsolved} points lie inside the control mesh, but the inverse of its "
-            f"{saved.coordinates} coordinates was not found there; they were left empty too"
+            f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse of "
+            f"its {saved.coordinates} coordinates was not found there; they were left empty too"
         )
-    for name, result in traced.items():
-        _warn_of_outside(f"the holes' {name}", result, console)
-    carried = {args.output: columns, args.samples_out: traced.get("samples", {})}
-    counts = [f"{len(c['location'])} points carried into {p}" for p, c in carried.items() if c]
+    for name in traced:
+        _warn_of_outside(f"the holes' {name}", named[name], console)
+    written = {args.output: named.get("points"), args.samples_out: named.get("samples")}
+    counts = [f"{c['carried']} points carried into {p}" for p, c in written.items() if c]
     console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
-    named = {"points": columns, **traced}
-    console.answer({name: _places(found) for name, found in named.items() if found})
+    console.answer(named)
 
 
 def _is_wireframe(args: Namespace) -> bool:
@@ -233,9 +247,10 @@ def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
         )
     with outputs.writing() as parts:
         write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
-    _warn_of_outside(args.points, result_columns(UNFOLDED, carried), console)
+    places = _places(result_columns(UNFOLDED, carried))
+    _warn_of_outside(args.points, places, console)
     console.done(f"{len(mesh.V)} vertices carried into {args.output}")
-    console.answer({"vertices": _places(result_columns(UNFOLDED, carried))})
+    console.answer({"vertices": places})
 
 
 def _flat(saved: UnfoldingMap | PointwiseMap) -> Callable[[Floats], dict[str, Any]]:
@@ -250,9 +265,9 @@ def _places(columns: dict[str, Any]) -> dict[str, int]:
     return {"carried": len(location), **{w: int(np.count_nonzero(location == w)) for w in words}}
 
 
-def _warn_of_outside(path: str, columns: dict[str, Any], console: Console) -> None:
+def _warn_of_outside(path: str, places: dict[str, int], console: Console) -> None:
     """Say how many carried points the control mesh does not hold."""
-    total, extrapolated, empty = _places(columns).values()
+    total, extrapolated, empty = (places[word] for word in ("carried", "extrapolated", "outside"))
     if extrapolated:
         console.warn(
             f"{path}: {extrapolated} of {total} points lie outside the control mesh and "
@@ -591,9 +606,36 @@ def _read(
     console.stage(f"reading {path}")
     columns = _triple(args.columns)
     table = read_points(path, columns, prefer=prefer, drop_invalid=args.drop_invalid)
+    _say_dropped(table, path, console)
+    return table
+
+
+def _open(
+    args: Namespace,
+    console: Console,
+    out: str,
+    prefer: tuple[Triple, ...] = (),
+    *,
+    keep: bool = True,
+    whole: bool = False,
+) -> PointTable | PointStream:
+    """Read the points of a command, in batches where both files are tables, unless wanted whole."""
+    if whole or ending(Path(out)) not in TABLE_ENDINGS:
+        return _read(args.points, args, console, prefer)
+    from geounfold.io.streams import open_points
+
+    console.stage(f"reading {args.points}")
+    columns = _triple(args.columns)
+    table = open_points(
+        args.points, columns, prefer=prefer, drop_invalid=args.drop_invalid, keep=keep
+    )
+    _say_dropped(table, args.points, console)
+    return table
+
+
+def _say_dropped(table: PointTable | PointStream, path: str, console: Console) -> None:
     if len(table.dropped):
         console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
-    return table
 
 
 def _read_samples(args: Namespace, console: Console) -> PointTable | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -91,6 +91,12 @@ class PointTable:
         frame = self.with_columns(columns)
         own = tuple(n for n in self._text_columns if n not in columns)
         write_table(path, frame, text=own, columns=self.columns, meta=self.meta)
+
+    def write_parts(
+        self, path: str | Path, make: Callable[[Floats, slice], dict[str, Any]]
+    ) -> None:
+        """Write the table with the results that `make` returns for the points and their rows."""
+        self.write(path, make(self.points, slice(0, len(self))))
 
     def check_writable(self, path: str | Path) -> None:
         """Raise OutputError where a file of this ending cannot hold the table's columns."""

@@ -13,12 +13,12 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 import pandas as pd
@@ -43,6 +43,10 @@ _FOREIGN = {
     b"\xff\xfe": "in UTF-16: save it as UTF-8",
     b"\xfe\xff": "in UTF-16: save it as UTF-8",
 }
+
+
+Writer = Callable[..., None]
+"""Writes a DataFrame, and of its columns from a CSV what they show by their names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,18 +172,9 @@ def _read_csv(path: Path) -> Table:
     """Return a CSV's columns as text."""
     with _as_input_error(path):
         content = _content(path)
-        names, separator, skip = _csv_header(path, content)
+        names, separator, skip = csv_header(path, content)
         try:
-            frame = pd.read_csv(
-                io.BytesIO(content),
-                sep=separator,
-                header=None,
-                skiprows=skip,
-                names=range(len(names)),
-                dtype=str,
-                na_filter=False,
-                encoding="utf-8-sig",
-            )
+            frame = csv_reader(io.BytesIO(content), len(names), separator, skip)
         except pd.errors.EmptyDataError:
             frame = pd.DataFrame(columns=range(len(names)), dtype=str)
     if not isinstance(frame.index, pd.RangeIndex):
@@ -193,12 +188,42 @@ def _read_csv(path: Path) -> Table:
     return Table(frame, text=True)
 
 
+@overload
+def csv_reader(
+    stream: IO[bytes], columns: int, separator: str, skip: int, batch: None = None
+) -> pd.DataFrame: ...
+@overload
+def csv_reader(
+    stream: IO[bytes], columns: int, separator: str, skip: int, batch: int
+) -> AbstractContextManager[Iterable[pd.DataFrame]]: ...
+def csv_reader(
+    stream: IO[bytes], columns: int, separator: str, skip: int, batch: int | None = None
+) -> Any:
+    """Return a CSV's columns as text, numbered from 0, or what yields batches of its rows."""
+    return pd.read_csv(
+        stream,
+        sep=separator,
+        header=None,
+        skiprows=skip,
+        names=range(columns),
+        dtype=str,
+        na_filter=False,
+        encoding="utf-8-sig",
+        chunksize=batch,
+    )
+
+
+def most_unpacked(path: Path) -> int:
+    """Return how many bytes a compressed table may unpack to."""
+    return max(_ROOM, _RATIO * path.stat().st_size)
+
+
 def _content(path: Path) -> bytes:
     """Return what a CSV holds, unpacked; not without end."""
     if ending(path) != ".csv.gz":
         return path.read_bytes()
     chunks, total = [], 0
-    most = max(_ROOM, _RATIO * path.stat().st_size)
+    most = most_unpacked(path)
     with gzip.open(path, "rb") as stream:
         while chunk := stream.read(_CHUNK):
             chunks.append(chunk)
@@ -211,7 +236,7 @@ def _content(path: Path) -> bytes:
     return b"".join(chunks)
 
 
-def _csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
+def csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
     """Return a CSV's column names, its separator, and how many rows come before the first."""
     for magic, what in _FOREIGN.items():
         if content.startswith(magic):
@@ -246,7 +271,8 @@ def _lines(content: bytes) -> Iterator[str]:
         start = end
 
 
-def _pyarrow() -> ModuleType:
+def pyarrow_module() -> ModuleType:
+    """Return pyarrow with its Parquet part, or MissingDependencyError."""
     try:
         import pyarrow.parquet
     except ImportError as error:
@@ -257,7 +283,7 @@ def _pyarrow() -> ModuleType:
 
 def _read_parquet(path: Path) -> Table:
     """Return a Parquet file's physical columns in their own types."""
-    pyarrow = _pyarrow()
+    pyarrow = pyarrow_module()
     try:
         arrow = pyarrow.parquet.ParquetFile(path).read()
         frame = arrow.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
@@ -359,14 +385,10 @@ def write_table(
     """
     path = Path(path)
     kind = ending(path)
-    if kind == ".parquet":
-        _write_parquet(path, frame, text)
-    elif kind == ".csv.gz":
-        with path.open("wb") as raw, gzip.GzipFile("", "wb", 3, raw, mtime=0) as stream:
-            stream.write(_csv_text(frame).encode("utf-8"))
-    elif kind == ".csv":
-        with path.open("w", encoding="utf-8", newline="") as plain:
-            plain.write(_csv_text(frame))
+    if kind in TABLE_ENDINGS:
+        typed = kind == ".parquet" and text
+        with table_writer(path) as write:
+            write(_all_typed(frame, text) if typed else frame)
     else:
         _write_format(path, _all_typed(frame, text), columns, meta or {})
 
@@ -428,13 +450,13 @@ def _write_format(
     module.write_points(path, frames.to_points(frame, xyz, named, meta))
 
 
-def _csv_text(frame: pd.DataFrame) -> str:
+def _csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
     """Return a frame as comma-separated lines."""
-    header = ",".join(_quoted([str(name) for name in frame.columns]))
+    head = [",".join(_quoted([str(name) for name in frame.columns]))] if header else []
     columns = [_fields(frame.iloc[:, i]) for i in range(frame.shape[1])]
     if len(columns) == 1:  # a blank line would be no row
         columns = [[field or '""' for field in columns[0]]]
-    return "\n".join([header, *map(",".join, zip(*columns, strict=True)), ""])
+    return "\n".join([*head, *map(",".join, zip(*columns, strict=True)), ""])
 
 
 def _fields(column: pd.Series) -> list[str]:
@@ -459,33 +481,119 @@ def _quoted(fields: list[str]) -> list[str]:
     return ['"' + f.replace('"', '""') + '"' if special & set(f) else f for f in fields]
 
 
-def _write_parquet(path: Path, frame: pd.DataFrame, text: tuple[str, ...]) -> None:
-    """Write a frame's columns as they are, those from a CSV in the types they show."""
-    pyarrow = _pyarrow()
-    arrays = [
-        pyarrow.array(_typed(column) if name in text else column, from_pandas=True)
-        for name, column in ((n, frame.iloc[:, i]) for i, n in enumerate(frame.columns))
-    ]
-    names = [str(name) for name in frame.columns]
-    pyarrow.parquet.write_table(pyarrow.Table.from_arrays(arrays, names=names), path)
+@contextmanager
+def table_writer(path: Path) -> Iterator[Writer]:
+    """Yield what writes one part of a table after the other into a file, by its ending.
+
+    All parts have the same columns; `write_table` says how their values are written.
+    """
+    kind = ending(path)
+    with ExitStack() as stack:
+        if kind == ".parquet":
+            yield stack.enter_context(closing(_ParquetParts(path))).write
+            return
+        raw = stack.enter_context(path.open("wb"))
+        stream: IO[bytes] = raw
+        if kind == ".csv.gz":
+            packed = gzip.GzipFile("", "wb", 3, raw, mtime=0)
+            stream = stack.enter_context(cast(IO[bytes], packed))
+        first = True
+
+        def write(frame: pd.DataFrame, kinds: Mapping[str, TextKind] | None = None) -> None:
+            nonlocal first
+            stream.write(_csv_text(frame, header=first).encode("utf-8"))
+            first = False
+
+        yield write
+
+
+class _ParquetParts:
+    """A Parquet file that grows part by part."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._pyarrow = pyarrow_module()
+        self._writer: Any = None
+
+    def write(self, frame: pd.DataFrame, kinds: Mapping[str, TextKind] | None = None) -> None:
+        """Write a frame's columns as they are, those from a CSV in the types they show."""
+        pyarrow, kinds = self._pyarrow, kinds or {}
+        names = [str(name) for name in frame.columns]
+        arrays = [
+            pyarrow.array(kinds[name].typed(column) if name in kinds else column, from_pandas=True)
+            for name, column in ((n, frame.iloc[:, i]) for i, n in enumerate(names))
+        ]
+        table = pyarrow.Table.from_arrays(arrays, names=names)
+        if self._writer is None:
+            # Coordinates hardly repeat: a dictionary of them costs time and room.
+            others = [f.name for f in table.schema if not pyarrow.types.is_floating(f.type)]
+            unique = len(set(names)) == len(names)
+            self._writer = pyarrow.parquet.ParquetWriter(
+                self._path, table.schema, use_dictionary=others if unique else True
+            )
+        self._writer.write_table(table.cast(self._writer.schema))
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.close()
+
+
+@dataclass(frozen=True)
+class TextKind:
+    """What the texts of a column show.
+
+    Attributes
+    ----------
+    filled : bool
+        Whether any is not blank.
+    whole, real : bool
+        Whether all that are not blank are integers, or floats, that lose nothing as numbers.
+    """
+
+    filled: bool
+    whole: bool
+    real: bool
+
+    @classmethod
+    def of(cls, column: pd.Series) -> TextKind:
+        """Return what a column of text shows."""
+        words = _words(column)
+        filled = words[words != ""]
+        whole, fraction = r"(?:0|[1-9]\d{0,14})", r"(?:[eE][+-]?\d+)?"
+        return cls(
+            len(filled) > 0,
+            bool(filled.str.fullmatch(r"0|-?[1-9]\d{0,17}").all()),
+            bool(filled.str.fullmatch(rf"[+-]?(?:{whole}(?:\.\d*)?|\.\d+){fraction}").all()),
+        )
+
+    def joined(self, other: TextKind) -> TextKind:
+        """Return what the texts of both show."""
+        return TextKind(
+            self.filled or other.filled, self.whole and other.whole, self.real and other.real
+        )
+
+    def typed(self, column: pd.Series) -> pd.Series:
+        """Return text as integers or floats where that loses nothing, blanks as missing."""
+        if not self.filled or not (self.whole or self.real):
+            return column
+        words = _words(column)
+        blank = (words == "").to_numpy()
+        if self.whole:
+            integers = pd.Series(pd.array([0] * len(words), dtype="Int64"))
+            integers[~blank] = words[~blank].astype(np.int64)
+            integers[blank] = pd.NA
+            return integers
+        return words.where(~blank, "nan").astype(np.float64)
+
+
+def _words(column: pd.Series) -> pd.Series:
+    return pd.Series(column.to_numpy(dtype=object), dtype=object).astype(str)
 
 
 def _typed(column: pd.Series) -> pd.Series:
     """Return text as integers or floats where that loses nothing, blanks as missing."""
-    words = pd.Series(column.to_numpy(dtype=object), dtype=object).astype(str)
-    blank = (words == "").to_numpy()
-    filled = words[~blank]
-    if not len(filled):
-        return column
-    if filled.str.fullmatch(r"0|-?[1-9]\d{0,17}").all():
-        integers = pd.Series(pd.array([0] * len(words), dtype="Int64"))
-        integers[~blank] = filled.astype(np.int64)
-        integers[blank] = pd.NA
-        return integers
-    whole, fraction = r"(?:0|[1-9]\d{0,14})", r"(?:[eE][+-]?\d+)?"
-    if filled.str.fullmatch(rf"[+-]?(?:{whole}(?:\.\d*)?|\.\d+){fraction}").all():
-        return words.where(~blank, "nan").astype(np.float64)
-    return column
+    return TextKind.of(column).typed(column)
 
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:

@@ -14,6 +14,7 @@ EXTRAS := dev,geostat,notebooks
 ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+SCALE_ARGS ?=
 SOAK_ARGS ?=
 RUNS ?= 10
 STUDY_ARGS ?=
@@ -63,8 +64,9 @@ format: $(STAMP)  ## put the code into the standard format
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(STAMP)  ## time whole runs on bodies of 21,600 to 300,000 blocks
+bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to 10 M blocks
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
+	$(BIN)/python tests/benchmarks/scale.py --readme --profile $(SCALE_ARGS)
 
 soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         regular_grid,
         transfer,
     )
+    from geounfold.clusters import map_partitions
     from geounfold.comparison import compare
     from geounfold.control import ControlMesh
     from geounfold.drillholes import DrillHoles, read_drillholes
@@ -69,6 +70,7 @@ _HOMES = {
     "flatten": "flattening",
     "UnfoldingMap": "mapping",
     "load": "mapping",
+    "map_partitions": "clusters",
     "TetMesh": "mesh",
     "TriMesh": "mesh",
     "UnfoldOptions": "options",
@@ -112,6 +114,7 @@ __all__ = [
     "fit_variogram",
     "flatten",
     "load",
+    "map_partitions",
     "neighbours",
     "nmd",
     "read_drillholes",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -74,7 +74,8 @@ class Carried:
 
     def part(self, rows: slice) -> Carried:
         """Return what became of some of the points."""
-        return Carried(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        arrays = (self.points, self.stratigraphic, self.inside, self.placed, self.element)
+        return Carried(*(array[rows] for array in arrays), self.distance[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -467,6 +468,10 @@ class UnfoldingMap:
         """Write the map as .npz without pickles: control mesh, frame, version, checksum."""
         write_arrays(path, self._arrays())
 
+    def __reduce__(self) -> tuple[Callable[..., UnfoldingMap], tuple[dict[str, np.ndarray]]]:
+        """Pickle as plain arrays: trees and tables are made anew where they are needed."""
+        return _of_arrays, (self._arrays(),)
+
     def _arrays(self) -> dict[str, np.ndarray]:
         frame, whole = self.frame, self.whole
         count = len(self.control.folded.T)
@@ -521,7 +526,11 @@ def load(path: str | Path) -> UnfoldingMap:
     InputError
         No such file, not a map, of another version, or damaged.
     """
-    arrays = read_arrays(path)
+    return _of_arrays(read_arrays(path))
+
+
+def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:
+    """Return the map that such arrays keep."""
     steps = arrays["steps"]
     frame = Frame(
         arrays["origin"],

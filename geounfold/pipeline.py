@@ -41,6 +41,7 @@ from geounfold.quality import SUSPECT, Quality, assess, assess_points, torn_bloc
 from geounfold.solid import solid_cells
 
 if TYPE_CHECKING:
+    import dask.dataframe
     import pyvista
 
 Progress = Callable[[str], None]
@@ -507,6 +508,16 @@ class Unfolding:
         if isinstance(points, pd.DataFrame):
             return with_carried(points, partial(self.map.carry, inverse=True), FOLDED)
         return self.to_folded(points)
+
+    def map_partitions(self, frame: dask.dataframe.DataFrame) -> dask.dataframe.DataFrame:
+        """Return a Dask DataFrame's points in the flat space, lazily, with ``transform``'s columns.
+
+        The map is sent to the workers, not the points to it; see `geounfold.map_partitions`,
+        which takes a map that was loaded and goes back as well.
+        """
+        from geounfold.clusters import map_partitions
+
+        return map_partitions(self.map, frame)
 
     def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
         """Return the points in one space with all columns, the other space as an array.

@@ -15,7 +15,7 @@ import numpy as np
 from geounfold.cli.console import Console
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.cli.table import table_text
-from geounfold.errors import InputError, OptionError
+from geounfold.errors import InputError, OptionError, OutputError
 from geounfold.io import (
     Outputs,
     PointTable,
@@ -165,6 +165,11 @@ def carry(args: Namespace, console: Console) -> None:
         )
     if args.holes is None and args.samples_out is not None:
         raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    if args.engine == "dask":
+        _carry_on_cluster(args, console)
+        return
+    if args.scheduler is not None:
+        raise OptionError("--scheduler needs --engine dask")
     if args.holes is not None and args.inverse:
         raise OptionError("--holes are where they were drilled: without --inverse")
     outputs = Outputs.planned(
@@ -220,6 +225,38 @@ def carry(args: Namespace, console: Console) -> None:
     counts = [f"{c['carried']} points carried into {p}" for p, c in written.items() if c]
     console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
     console.answer(named)
+
+
+def _carry_on_cluster(args: Namespace, console: Console) -> None:
+    """Carry a table in parts by a Dask cluster, into a folder of parts."""
+    if args.points is None or args.holes is not None:
+        raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
+    kind = ending(Path(args.output))
+    if kind not in (".csv", ".parquet"):
+        raise OptionError(
+            f"--engine dask writes a folder that ends in .csv or .parquet, not '{args.output}'"
+        )
+    from geounfold import mapping
+    from geounfold.clusters import Carrying, carry_folder
+    from geounfold.io.outputs import whole_folder
+    from geounfold.io.parts import parts_of
+
+    existing_file(Path(args.map))
+    if Path(args.output).resolve() == Path(args.points).resolve():
+        raise OutputError(f"{args.output}: --output is also an input; choose another folder")
+    how = Carrying(_triple(args.columns), args.inverse, args.drop_invalid, kind)
+    with whole_folder(args.output, overwrite=args.overwrite, watcher=console.journal) as folder:
+        saved = mapping.load(args.map)
+        console.stage(f"looking through {args.points}")
+        parts = parts_of(args.points)
+        console.stage("carrying points")
+        found = carry_folder(args.scheduler, saved, parts, folder.absolute(), how)
+    dropped = found.pop("dropped")
+    if dropped:
+        console.warn(f"{args.points}: {dropped} rows without finite coordinates were left out")
+    _warn_of_outside(args.points, found, console)
+    console.done(f"{found['carried']} points carried into {args.output}, {len(parts)} parts")
+    console.answer({"points": found, "parts": len(parts)})
 
 
 def _is_wireframe(args: Namespace) -> bool:

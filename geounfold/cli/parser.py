@@ -148,6 +148,7 @@ zsh:   geounfold completion zsh > ~/.zsh/_geounfold    (a folder in fpath)
 tcsh:  geounfold completion tcsh > ~/.geounfold.csh    (and source it from ~/.tcshrc)
 
 Needs: pip install 'geounfold[completion]'"""
+ENGINES = ("local", "dask")
 SHELLS = ("bash", "zsh", "tcsh")
 _EXIT = "exit status: 0 done, 2 input or options at fault, 1 anything else, 130 interrupted"
 
@@ -412,6 +413,18 @@ def _add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> 
         help=f"where POINTS go: {_POINTS}; a surface as a mesh file keeps its triangles",
     )
     parser.add_argument("--inverse", action="store_true", help="from unfolded to folded")
+    parser.add_argument(
+        "--engine",
+        choices=ENGINES,
+        default=ENGINES[0],
+        help="local (default): this process; dask: POINTS, a .parquet or .csv file or a folder of "
+        "them, is carried in parts by a cluster, and OUT becomes a folder of such parts",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a running Dask cluster, such as tcp://host:8786; without, this machine's cores",
+    )
     _add_columns(parser)
     _add_holes(parser).add_argument("--samples-out", metavar="Q", help="where samples go")
 

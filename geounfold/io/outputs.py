@@ -175,6 +175,56 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         yield parts["the output"]
 
 
+@contextmanager
+def whole_folder(
+    path: str | Path, *, overwrite: bool = False, watcher: Watcher | None = None
+) -> Iterator[Path]:
+    """Yield a folder to write into; it appears at `path` once the block has ended well.
+
+    Raises
+    ------
+    OutputError
+        Something is at `path` that may not be replaced or is no folder, or the folder around it
+        is missing or cannot be written.
+    """
+    target, watcher = Path(path).absolute(), watcher or _Deaf()
+    _check_folder(target, overwrite)
+    _check_writable(target.parent, watcher)
+    part = _part_of(target.parent)
+    watcher.part(part)
+    try:
+        with _as_output_error([target]):
+            part.mkdir(0o700)
+            fresh = part / target.name
+            fresh.mkdir()
+            yield fresh
+            for file in fresh.iterdir():
+                _flush(file)
+            with watcher.committing():
+                _check_folder(target, overwrite)
+                old = part / f"{target.name}.old"
+                if target.exists():
+                    target.rename(old)
+                try:
+                    fresh.rename(target)
+                except BaseException:
+                    if old.exists():
+                        old.rename(target)
+                    raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _check_folder(target: Path, overwrite: bool) -> None:
+    """Raise where a folder cannot take this place."""
+    if not os.path.lexists(target):
+        return
+    if target.is_symlink() or not target.is_dir():
+        raise OutputError(f"{target}: exists and is not a folder; parts are written into one")
+    if not overwrite:
+        raise OutputError(f"{target}: the folder exists already; --overwrite replaces it")
+
+
 def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
     """Return where a link leads, with a valid ending."""
     try:

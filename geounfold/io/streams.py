@@ -71,6 +71,12 @@ class ParquetSource:
         self.names = list(self._file.schema_arrow.names)
         self.rows = int(self._file.metadata.num_rows)
 
+    @property
+    def group_rows(self) -> list[int]:
+        """How many rows each row group has."""
+        meta = self._file.metadata
+        return [int(meta.row_group(k).num_rows) for k in range(meta.num_row_groups)]
+
     def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
         """Yield batches in the columns' own types."""
         chosen = None if columns is None else [self.names[k] for k in columns]
@@ -89,7 +95,7 @@ class CsvSource:
         self._packed = tables.ending(path) == ".csv.gz"
         with self._open() as stream:
             head = stream.read(_HEAD)
-            self.names, self._separator, self._skip = tables.csv_header(path, head)
+            self.names, self.separator, self.skip = tables.csv_header(path, head)
         self._check()
 
     def _open(self) -> IO[bytes]:
@@ -111,7 +117,7 @@ class CsvSource:
         with ExitStack() as stack:
             stream = stack.enter_context(self._open())
             reader = stack.enter_context(
-                tables.csv_reader(stream, len(self.names), self._separator, self._skip, BATCH)
+                tables.csv_reader(stream, len(self.names), self.separator, self.skip, BATCH)
             )
             for frame in reader:
                 if not isinstance(frame.index, pd.RangeIndex):

@@ -13,7 +13,7 @@ Columns: seconds are wall seconds, `cpu` those of all cores; `peak_mb` is the la
 memory; stages are the summary's.  Beside each run, in one process that has the points in memory:
 
   read_csv       pandas.read_csv of the points as CSV (three columns)
-  tree, nearest  scipy.spatial.cKDTree of the points, and the nearest of them for each (k=1, workers=2)
+  tree, nearest  scipy.spatial.cKDTree of the points, and its query of them all (k=1, workers=2)
   in_element     libigl's in_element of the points in the control mesh, its tree built already
   carry          UnfoldingMap.carry of the points: located, barycentric, written into arrays
 """

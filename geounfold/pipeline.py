@@ -140,6 +140,7 @@ def unfold(
         fit(part, _sorted(given[group]), frame, chosen, reference, clock.stage)
         for part, group in zip(parts, groups, strict=True)
     ]
+    del filled, work, parts  # as large as the points, and done with
     with clock.stage("map"):
         mapping = _mapping(fits, frame, chosen)
         carried = mapping.carry(P)

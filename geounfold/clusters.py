@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from dask.dataframe import DataFrame
     from distributed import Client
 
+    from geounfold.methods import PointwiseMap
+
 _WAIT = 10  # seconds for a scheduler to answer
 
 
@@ -37,12 +39,14 @@ def _missing(error: ImportError) -> MissingDependencyError:
     return MissingDependencyError(f"Dask is not installed: pip install 'geounfold[dask]' ({error})")
 
 
-def map_partitions(mapping: UnfoldingMap, frame: DataFrame, *, inverse: bool = False) -> DataFrame:
+def map_partitions(
+    mapping: UnfoldingMap | PointwiseMap, frame: DataFrame, *, inverse: bool = False
+) -> DataFrame:
     """Return a Dask DataFrame with where its points come to lie, computed where it is.
 
     Parameters
     ----------
-    mapping : UnfoldingMap
+    mapping : UnfoldingMap or PointwiseMap
         A fitted map, as ``Unfolding.map`` or ``load`` gives it.
     frame : dask.dataframe.DataFrame
         Points; the coordinate columns are found by name.
@@ -73,7 +77,9 @@ def map_partitions(mapping: UnfoldingMap, frame: DataFrame, *, inverse: bool = F
     return out
 
 
-def _carried(frame: pd.DataFrame, mapping: UnfoldingMap, inverse: bool) -> pd.DataFrame:
+def _carried(
+    frame: pd.DataFrame, mapping: UnfoldingMap | PointwiseMap, inverse: bool
+) -> pd.DataFrame:
     carry = partial(mapping.carry, inverse=inverse)
     return with_carried(frame, carry, FOLDED if inverse else UNFOLDED)
 

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from geounfold.errors import InputError
 from geounfold.mesh import Bools, Floats, Ints
+from geounfold.threads import over_slices
 
 SHARE = 0.97
 """Share of the points that must lie on a lattice for it to count as theirs."""
@@ -30,6 +31,9 @@ _DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10)  # finer steps tried: sub-blocks in a pare
 _PARTS = (1, 2, 4)  # of the steps first seen, tried in turn
 _SEEDS, _BALL, _CENTRAL = 6, 1000, 30  # places looked at, points at each, points compared
 _LOOSE = 0.15  # in steps: points that take part in a fit before its last
+_FITTED = 200_000  # points that the last fits take in where there are more than twice so many
+_MIXED = np.array([7.0, 11.0, 13.0]) * np.sqrt([2.0, 3.0, 5.0])  # no lattice is regular to it
+_SLICE = 1 << 14  # points at once
 _SAMPLED = 200_000  # points beyond which point_spacing looks at a part of them
 
 
@@ -199,8 +203,13 @@ def _balls(X: Floats) -> list[Floats]:
 
 
 def _squared(X: Floats, place: Floats) -> Floats:
-    D = X - place
-    out: Floats = np.einsum("ij,ij->i", D, D)
+    out = np.empty(len(X))
+
+    def work(rows: slice) -> None:
+        D = X[rows] - place
+        np.einsum("ij,ij->i", D, D, out=out[rows])
+
+    over_slices(work, len(X), _SLICE)
     return out
 
 
@@ -330,23 +339,46 @@ def refit(X: Floats, fit: Fit, tolerance: float) -> Fit | None:
 
 
 def _accepted(X: Floats, fit: Fit, reference: Floats) -> Lattice | None:
-    """Return the lattice that 97 % of all points lie on, or None."""
-    loose = refit(X, fit, _LOOSE)
+    """Return the lattice that 97 % of all points lie on, or None; of many, some are fitted."""
+    some = _some(X)
+    loose = refit(some, fit, _LOOSE)
     if loose is None:
         return None
-    steps = _finest(loose.cells(X), loose.steps)
+    steps = _finest(loose.cells(some), loose.steps)
     if steps is None:
         return None
-    last = refit(X, Fit(loose.axes, steps, loose.origin), TOLERANCE)
+    last = refit(some, Fit(loose.axes, steps, loose.origin), TOLERANCE)
     if last is None:
         return None
-    share = float(_on_lattice(last.cells(X), TOLERANCE).mean())
+    share = _share(X, last)
     if share < SHARE:
         return None
     axes, steps = named(last.axes, last.steps)
     middle = np.rint(last.cells(np.zeros((1, 3))))[0]
     origin = last.origin + (middle * last.steps) @ last.axes
     return Lattice(axes=axes, steps=steps, share=share, origin=reference + origin)
+
+
+def _some(X: Floats) -> Floats:
+    """Return about _FITTED of more than twice so many points, spread over all of them.
+
+    Which ones depends on their coordinates, not on their order.
+    """
+    if len(X) <= 2 * _FITTED:
+        return X
+    number = X[:, 0] * _MIXED[0] + X[:, 1] * _MIXED[1] + X[:, 2] * _MIXED[2]
+    number -= np.floor(number)
+    out: Floats = X[number < _FITTED / len(X)]
+    return out if len(out) > _FITTED / 2 else X
+
+
+def _share(X: Floats, fit: Fit) -> float:
+    """Return the share of all points that lie on a lattice."""
+
+    def work(rows: slice) -> int:
+        return int(np.count_nonzero(_on_lattice(fit.cells(X[rows]), TOLERANCE)))
+
+    return sum(over_slices(work, len(X), _SLICE)) / len(X)
 
 
 def _finest(cells: Floats, steps: Floats) -> Floats | None:

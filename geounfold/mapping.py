@@ -74,8 +74,14 @@ class Carried:
 
     def part(self, rows: slice) -> Carried:
         """Return what became of some of the points."""
-        arrays = (self.points, self.stratigraphic, self.inside, self.placed, self.element)
-        return Carried(*(array[rows] for array in arrays), self.distance[rows])
+        return Carried(
+            self.points[rows],
+            self.stratigraphic[rows],
+            self.inside[rows],
+            self.placed[rows],
+            self.element[rows],
+            self.distance[rows],
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -269,11 +269,14 @@ def _with_missing(
 
 def _missing(cells: Ints) -> Ints:
     """Return the places of blocks that are missing at random or in a slab, (m, 3)."""
-    if _usual(_Cells.of(cells)) < FEWEST:
+    filled = _Cells.of(cells)
+    if filled.usual < FEWEST:
         return np.zeros((0, 3), np.int64)
-    alone = surrounded(cells)
-    cells = np.concatenate([cells, alone])
-    slab = parting(cells)
+    alone = _surrounded(filled)
+    if len(alone):
+        cells = np.concatenate([cells, alone])
+        filled = _Cells.of(cells)
+    slab = _parting(filled)
     if not len(slab):
         return alone
     rest = surrounded(np.concatenate([cells, slab]))
@@ -319,6 +322,11 @@ class _Cells:
     def around(self) -> list[int]:
         """What the keys of a cell's 26 neighbours are away from its own."""
         return [int(np.array(o) @ self.stride) for o in product((-1, 0, 1), repeat=3) if any(o)]
+
+    @cached_property
+    def usual(self) -> float:
+        """The upper quartile of the number of blocks among a block's 26 neighbours."""
+        return float(np.percentile(self.neighbours(self.keys), 75))
 
     @cached_property
     def table(self) -> Bools | None:
@@ -379,7 +387,10 @@ def parting(cells: Ints) -> Ints:
     cells : (n, 3) int
         Lattice cell of every block.
     """
-    filled = _Cells.of(cells)
+    return _parting(_Cells.of(cells))
+
+
+def _parting(filled: _Cells) -> Ints:
     keys, part = filled.keys, filled.parts()
     sizes = np.bincount(part)
     if (sizes >= _LARGE * len(keys)).sum() < 2:
@@ -409,10 +420,13 @@ def surrounded(cells: Ints) -> Ints:
     cells : (n, 3) int
         Lattice cell of every block.
     """
-    filled = _Cells.of(cells)
+    return _surrounded(_Cells.of(cells))
+
+
+def _surrounded(filled: _Cells) -> Ints:
     added, fresh = [np.zeros(0, np.int64)], filled.keys
     for _ in range(_ROUNDS):
-        least = max(SURROUNDED * _usual(filled) / len(filled.around), FEWEST)
+        least = max(SURROUNDED * filled.usual / len(filled.around), FEWEST)
         beside = [part[~filled.held(part)] for part in (fresh + s for s in filled.around)]
         place = sorted_distinct(np.concatenate(beside))
         fresh = place[filled.neighbours(place) >= least]
@@ -421,8 +435,3 @@ def surrounded(cells: Ints) -> Ints:
         added.append(fresh)
         filled = filled.with_keys(fresh)
     return filled.places(np.concatenate(added))
-
-
-def _usual(filled: _Cells) -> float:
-    """Return the upper quartile of the number of blocks among a block's 26 neighbours."""
-    return float(np.percentile(filled.neighbours(filled.keys), 75))

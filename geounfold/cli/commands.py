@@ -217,7 +217,8 @@ def carry(args: Namespace, console: Console) -> None:
     if sum(unsolved):
         console.warn(
             f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse of "
-            f"its {saved.coordinates} coordinates was not found there; they were left empty too"
+            "its "
+            f"{saved.coordinates} coordinates was not found there; they were left empty too"
         )
     for name in traced:
         _warn_of_outside(f"the holes' {name}", named[name], console)

@@ -216,9 +216,8 @@ def carry(args: Namespace, console: Console) -> None:
         _warn_of_outside(args.points, named["points"], console)
     if sum(unsolved):
         console.warn(
-            f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse of "
-            "its "
-            f"{saved.coordinates} coordinates was not found there; they were left empty too"
+            f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse "
+            f"of its {saved.coordinates} coordinates was not found there; they were left empty too"
         )
     for name in traced:
         _warn_of_outside(f"the holes' {name}", named[name], console)

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from geounfold.cloud import scattered
+from geounfold.coarse import merged, merges
+from geounfold.errors import (
+    BackendError,
+    ControlMeshError,
+    FlatteningError,
+    HullError,
+    NoSheetError,
+    SplitError,
+)
 from geounfold.frame import Frame
 from geounfold.hull import extract_hull
 from geounfold.mesh import Floats, TriMesh
@@ -45,11 +55,52 @@ def fit(
     HullError, NoSheetError, SplitError, FlatteningError
         As the stages do.
     """
-    method, hull = METHODS[options.method], None
+    with stage("hull"):
+        tried = _merges(points, frame, options, reference)
+    for merge in tried:
+        try:
+            return _fit_at(merge, points, blocks, frame, options, reference, stage)
+        except _TOO_COARSE:
+            continue
+    return _fit_at(1, points, blocks, frame, options, reference, stage)
+
+
+_TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoSheetError, SplitError)
+"""What a body's shape may do to merged blocks and not to the blocks themselves."""
+
+
+def _merges(
+    points: Floats, frame: Frame, options: UnfoldOptions, reference: object
+) -> tuple[int, ...]:
+    """Return how many blocks to merge along a cell's side, the most first (see merges).
+
+    Scattered points are left as they are: nothing tells how full such cells are.
+    """
+    chosen = options.sheet_options.coarse
+    if reference is not None or options.method != "sheet" or len(points) <= chosen.blocks:
+        return ()
+    if frame.steps is None and scattered(points):
+        return ()
+    return merges(points, frame.steps, chosen)
+
+
+def _fit_at(
+    merge: int,
+    points: Floats,
+    blocks: Floats,
+    frame: Frame,
+    options: UnfoldOptions,
+    reference: tuple[TriMesh, TriMesh] | None,
+    stage: Stage,
+) -> BodyFit:
+    """Return the fit to cells of ``merge`` blocks a side, or, at 1, to the blocks (see fit)."""
+    method, hull, coarse = METHODS[options.method], None, None
     if reference is None:
         with stage("hull"):
             name = method.hull if options.hull == "auto" else options.hull
-            hull = extract_hull(points, frame.sides, name, options.hull_options)
+            coarse = merged(points, frame.steps, merge) if merge > 1 else None
+            cells, share = (points, None) if coarse is None else (coarse.points, coarse.share)
+            hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
         with stage("split"):
             parts = split(hull.mesh, options.split)
     else:
@@ -70,6 +121,7 @@ def fit(
         options=getattr(options, method.options),
         sheet_options=options.sheet_options,
         stage=stage,
+        coarse=coarse,
     )
     result = method.fit(body)
     return turned_over(result) if over else result

@@ -89,6 +89,15 @@ class SurfaceSplit:
     flipped_up: bool
     beyond: Bools
 
+    def scaled(self, factor: float) -> SurfaceSplit:
+        """Return the split in another unit: lengths times a factor."""
+        return replace(
+            self,
+            mesh=self.mesh.with_vertices(self.mesh.V * factor),
+            thickness=self.thickness * factor,
+            median_thickness=self.median_thickness * factor,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _Faces:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -41,6 +42,7 @@ def extract_hull(
     steps: Floats | None,
     method: str = "auto",
     options: HullOptions | None = None,
+    weights: Floats | None = None,
 ) -> Hull:
     """Return a closed, outward, manifold surface of one component around the points.
 
@@ -55,6 +57,9 @@ def extract_hull(
         `unsuitability`), with the reason in ``Hull.reason``.
     options : HullOptions, optional
         Lengths and thresholds.
+    weights : (n,) float, optional
+        Volume of each point, where it stands for a cell that blocks fill in part; 1 by default.
+        Methods but the density take the points of cells that are half full.
 
     Raises
     ------
@@ -67,13 +72,25 @@ def extract_hull(
     options = options or HullOptions()
     sides = np.ones(3) if steps is None or steps.max() <= UNEQUAL * steps.min() else steps
     makers = HULLS
-    if steps is None and scattered(points):
+    if weights is not None:
+        makers = _weighted(weights)
+    elif steps is None and scattered(points):
         makers = HULLS | {"density": scattered_hull}
     if method == "auto":
         return _first_suitable(makers, points, sides, options)
     if method not in HULLS:
         raise OptionError(f"unknown hull '{method}'; valid: auto, {', '.join(HULLS)}")
     return makers[method](points, sides, options)
+
+
+def _weighted(weights: Floats) -> dict[str, Maker]:
+    """Return the methods for points of some volume each."""
+
+    def halved(make: Maker) -> Maker:
+        return lambda points, sides, options: make(points[weights >= 0.5], sides, options)
+
+    out = {name: halved(make) for name, make in HULLS.items()}
+    return out | {"density": partial(density_hull, weights=weights)}
 
 
 def _first_suitable(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,6 +51,17 @@ class Hull:
     dropped: int = 0
     even: bool = False
     reason: str = ""
+
+    def scaled(self, factor: float) -> Hull:
+        """Return the hull in another unit: lengths times a factor."""
+        return replace(
+            self,
+            mesh=self.mesh.with_vertices(self.mesh.V * factor),
+            volume=self.volume * factor**3,
+            blocks_volume=self.blocks_volume * factor**3,
+            inset=self.inset * factor,
+            blur=self.blur * factor,
+        )
 
     def blur_variance(self, steps: Floats | None) -> Floats:
         """Return the blur's variance along each working axis, (3,).

@@ -164,7 +164,9 @@ class DensityField:
         return np.stack(slope, axis=1) * 2
 
 
-def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
+def density_hull(
+    points: Floats, sides: Floats, options: HullOptions, weights: Floats | None = None
+) -> Hull:
     """Return the hull on which the blurred block density is half its inner value.
 
     Parameters
@@ -176,23 +178,26 @@ def density_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
         ``points / sides``.
     options : HullOptions
         ``sigma``, ``level`` and the remeshing are used.
+    weights : (n,) float, optional
+        Volume of each block, 1 by default.
 
     Raises
     ------
     HullError
         The points are too sparse for any part of the grid to reach the level.
     """
-    field = density_field(points / sides, options.sigma)
+    field = density_field(points / sides, options.sigma, weights)
     thin = THIN[0] < field.filling < THIN[1]
     flat = sides.max() > UNEQUAL * sides.min()
     blur, inset = field.blur, 0.0
     if thin:
         solid = float(sides.max() ** 3 / sides.prod())
         sides = np.full(3, sides.max())  # flat blocks in a thin sheet may not even touch
-        field = density_field(points / sides, options.sigma_thin)
+        field = density_field(points / sides, options.sigma_thin, weights)
         inset = field.inset(options.level, solid) * float(sides[0])
         blur = field.blur * float(sides[0])
-    hull = _finished(field, sides, len(points), blur, options, inset=inset, fine=thin)
+    volume = len(points) if weights is None else float(weights.sum())
+    hull = _finished(field, sides, volume, blur, options, inset=inset, fine=thin)
     # Flat blocks climb a slope in stairs wider than the blur: unsmoothed, they pass for rims
     # (rms 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
     return smoothed(hull, options.smoothing) if flat else hull

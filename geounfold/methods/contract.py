@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from geounfold.coarse import Coarse
 from geounfold.control import ControlMesh
 from geounfold.flattening import Flattening, flatten
 from geounfold.frame import Frame
@@ -57,6 +58,8 @@ class Body:
         How reference surfaces are fitted.
     stage : callable
         See Stage.
+    coarse : Coarse or None
+        The points merged into cells, where they are many; hull and split are in its unit then.
     """
 
     points: Floats
@@ -71,6 +74,7 @@ class Body:
     options: Any
     sheet_options: SheetOptions
     stage: Stage
+    coarse: Coarse | None = None
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
         """Lay a surface flat by the chosen flattener, as the answer comes."""

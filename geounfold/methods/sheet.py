@@ -24,7 +24,9 @@ def fit_sheet(body: Body) -> BodyFit:
         name: SurfacePair(folded, unfolded, mesh.flattenings[name])
         for name, (folded, unfolded) in mesh.surfaces.items()
     }
+    unit = 1 if body.coarse is None else body.coarse.merge
     notes = {
+        "merged": unit,
         "rung": mesh.rungs[-1].name,
         "rungs": [asdict(rung) for rung in mesh.rungs],
         "roughness": result.fitted.roughness,
@@ -34,8 +36,8 @@ def fit_sheet(body: Body) -> BodyFit:
         "layers_follow": {0.0: "mid", 1.0: "top", -1.0: "bottom"}[result.fitted.lean],
     }
     return BodyFit(
-        body.hull,
-        body.split,
+        None if body.hull is None else body.hull.scaled(unit),
+        body.split.scaled(unit),
         mesh.control,
         mesh.shell,
         surfaces,
@@ -71,4 +73,5 @@ def sheet_stages(body: Body, datum: str, shell: float) -> SheetResult:
             replace(chosen, control=replace(chosen.control, shell=shell)),
             datum,
             exact=body.hull is None,
+            coarse=body.coarse,
         )

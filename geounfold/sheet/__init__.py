@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from geounfold.coarse import Coarse, CoarseOptions
+from geounfold.errors import ControlMeshError, SplitError
 from geounfold.flattening import SpringOptions
 from geounfold.flattening import flatten as flatten_surface
 from geounfold.geometry import vertex_sum
@@ -21,11 +24,12 @@ from geounfold.sheet.horizons import (
 )
 from geounfold.sheet.layered import LayerOptions, sharpen_layers
 from geounfold.sheet.medial import MedialOptions, MedialSheet, medial_sheet
-from geounfold.sheet.occupancy import OccupancyOptions, sharpen
+from geounfold.sheet.occupancy import OccupancyOptions, enough_sites, sharpen
 from geounfold.sheet.sites import Sites, surface_sites
 from geounfold.split import SurfaceSplit
 
 __all__ = [
+    "CoarseOptions",
     "ConformOptions",
     "ControlOptions",
     "FitOptions",
@@ -62,6 +66,7 @@ class SheetOptions:
     layers: LayerOptions = field(default_factory=LayerOptions)
     conform: ConformOptions = field(default_factory=ConformOptions)
     control: ControlOptions = field(default_factory=ControlOptions)
+    coarse: CoarseOptions = field(default_factory=CoarseOptions)
     refused_rough: float = 1.25
 
 
@@ -90,13 +95,15 @@ def fit_body(
     options: SheetOptions,
     datum: str = "mid",
     exact: bool = False,
+    coarse: Coarse | None = None,
 ) -> SheetResult:
     """Return the control mesh of a split body by the sheet method, and what led to it.
 
     Parameters
     ----------
     split : SurfaceSplit
-        The hull's (or the reference surfaces') faces as top, bottom, rim; working units.
+        The hull's (or the reference surfaces') faces as top, bottom, rim; in working units, or
+        in those of ``coarse``.
     points : (n, 3) float
         What the sheet is fitted to, working units: blocks on their lattice, gaps filled.
     blocks : (b, 3) float
@@ -104,7 +111,8 @@ def fit_body(
     steps : (3,) float or None
         Block sides, where the blocks lie on a lattice at whole multiples of them.
     variance : (3,) float
-        Variance of the blur the hull was made with, per axis; zeros for none.
+        Variance of the blur the hull was made with, per axis; zeros for none.  Like ``inset``
+        in the split's unit.
     inset : float
         How far inside the body's surface the hull runs.
     flatten : callable
@@ -115,27 +123,43 @@ def fit_body(
         Which surface is flat: mid, top, bottom or proportional.
     exact : bool
         The faces are the horizons themselves (reference surfaces): blocks do not correct them.
+    coarse : Coarse, optional
+        The points merged into cells, which the hull was made of; its unit is a cell's side.
 
     Raises
     ------
     SplitError
-        No part of the top has a parallel bottom.
+        No part of the top has a parallel bottom; or merged blocks are too coarse for the body.
+    ControlMeshError
+        Of merged blocks: it could not be proved, or does not hold every block.
     """
+    unit = 1 if coarse is None else coarse.merge
     medial = medial_sheet(split, _parameters, options.medial)
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     samples = Samples(split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset)
+    cells = points if coarse is None else coarse.points
+
+    def first(fit: FitOptions) -> FittedSheet:
+        return fit_sheet(medial, samples, cells, fit).scaled(unit)
+
     sites = None
     if exact:
-        fitted, sharpened = fit_sheet(medial, samples, points, options.fit), ""
+        fitted, sharpened, used = first(options.fit), "", None
     else:
-        if steps is not None:
-            sites = surface_sites(np.rint(points / steps).astype(np.int64), steps)
-        fitted, sharpened = _fitted(medial, samples, points, sites, options)
-    fitted = conform(fitted, medial, _parameters, options.conform)
-    horizons = fit_horizons(fitted, samples, options.fit.knots, options.horizons)
-    if sites is not None and sharpened:
-        horizons = separate_horizons(fitted, horizons, sites, options.horizons, options.occupancy)
+        sites = None if steps is None else _sites(points, steps, coarse)
+        fitted, sharpened, used = _fitted(first, points, sites, options)
+    if coarse is not None and not sharpened:
+        raise SplitError(f"a sheet fitted to cells of {unit} blocks a side cannot be sharpened")
+    fitted = conform(fitted, medial.scaled(unit), _parameters, options.conform)
+    hull = fitted.scaled(1 / unit)
+    horizons = fit_horizons(hull, samples, options.fit.knots, options.horizons).scaled(unit)
+    if used is not None and sharpened:
+        horizons = separate_horizons(fitted, horizons, used, options.horizons, options.occupancy)
+    if coarse is not None:  # the blocks at the surface lie as far out as any
+        points = points[coarse.border] if sites is None else sites.points[sites.occupied]
     mesh = build_control(fitted, horizons, points, blocks, flatten, options.control, datum)
+    if coarse is not None and not mesh.sound:
+        raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
     return SheetResult(medial, fitted, horizons, mesh, sharpened)
 
 
@@ -144,24 +168,33 @@ def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
     return flatten_surface(mesh, "spring", start=start, options=_COARSE, repair=False).uv
 
 
+def _sites(points: Floats, steps: Floats, coarse: Coarse | None) -> Sites:
+    """Return the lattice sites at the surface of the points' body."""
+    if coarse is None:
+        return surface_sites(np.rint(points / steps).astype(np.int64), steps)
+    near = np.rint(points[coarse.beside] / steps).astype(np.int64)
+    return surface_sites(near, steps, coarse.border[coarse.beside])
+
+
 def _fitted(
-    medial: MedialSheet,
-    samples: Samples,
+    first: Callable[[FitOptions], FittedSheet],
     points: Floats,
     sites: Sites | None,
     options: SheetOptions,
-) -> tuple[FittedSheet, str]:
-    """Return the fitted sheet, and what sharpened it (see SheetResult).
+) -> tuple[FittedSheet, str, Sites | None]:
+    """Return the fitted sheet, what sharpened it (see SheetResult), and the sites used.
 
+    ``first`` fits a sheet to the hull alone.
     Sites that no smooth sheet explains belong to a rougher body: it is fitted again, less
     smoothly.
     """
-    fitted = fit_sheet(medial, samples, points, options.fit)
+    fitted = first(options.fit)
     if sites is None:
         layered = sharpen_layers(fitted, points, options.layers)
-        return (fitted, "") if layered is None else (layered, "layers")
-    sharper = sharpen(fitted, sites, options.occupancy)
+        return (fitted, "", None) if layered is None else (layered, "layers", None)
+    used = enough_sites(fitted, sites, options.occupancy)
+    sharper = sharpen(fitted, used, options.occupancy)
     if sharper is not None:
-        return sharper, "sites"
+        return sharper, "sites", used
     rougher = replace(options.fit, rough=options.refused_rough)
-    return fit_sheet(medial, samples, points, rougher), ""
+    return first(rougher), "", used

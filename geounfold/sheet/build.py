@@ -30,7 +30,8 @@ class ControlOptions:
 
     ``cell``: side of the footprint's cells, and ``widest``, ``turn``, ``many``: on footprints of
     more cells than ``many`` cells grow up to the widest while the surface turns by no more than
-    ``turn`` radians over one; ``dilation``: rings of cells past the blocks;
+    ``turn`` radians over one; ``turn_merged``: the same where blocks were merged, and cells are
+    as much wider as allows; ``dilation``: rings of cells past the blocks;
     ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
     where they vary; ``focal``: largest share of the focal distance, ``focal_refined``: the same
     with cells of half the side; ``slopes``: of the caps along the sheet, tried in order;
@@ -43,6 +44,7 @@ class ControlOptions:
     widest: float = 3.0
     turn: float = 0.1
     many: int = 8000
+    turn_merged: float = 0.25
     dilation: int = 1
     pad: float = 0.6
     pad_capped: float = 1.0
@@ -82,6 +84,11 @@ class SheetMesh:
     layers: Layers
     rungs: tuple[Rung, ...]
     surfaces: dict[str, tuple[TriMesh, TriMesh]]
+
+    @property
+    def sound(self) -> bool:
+        """Whether some rung was proved and lost no block."""
+        return any(not rung.flaws and rung.lost == 0 for rung in self.rungs)
 
 
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
@@ -223,10 +230,13 @@ def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
     return np.stack([bounded_slope(cap, U, F, slope) for cap in _room(columns, share)])
 
 
-def _footprint(sheet: Sheet, U: Floats, options: ControlOptions, side: float | None) -> Footprint:
+def _footprint(
+    sheet: Sheet, U: Floats, options: ControlOptions, unit: float, side: float | None
+) -> Footprint:
     """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow.
 
-    ``side``: that of the cells, where it is not left to size and bends.
+    ``unit``: side of the cells that blocks were merged into, 1 where they were not; ``side``:
+    that of the footprint's cells, where it is not left to size and bends.
     """
     angle = principal_direction(sheet, U)
 
@@ -234,13 +244,20 @@ def _footprint(sheet: Sheet, U: Floats, options: ControlOptions, side: float | N
         rings = int(np.ceil(options.shell / cell))
         return footprint(U, angle, cell, options.dilation, rings)
 
-    prints = prints_of(options.cell if side is None else side)
+    start = options.cell if side is None else side
+    if side is None and unit > 1:
+        start = float(np.clip(options.turn_merged / _bend(sheet, U), start, start * unit))
+    prints = prints_of(start)
     if side is not None or len(prints.F) <= 2 * options.many:
         return prints
-    k1, k2 = principal_curvatures(sheet.jet(prints.U))
-    bend = float(np.percentile(np.maximum(k1, -k2), 99))
-    cell = min(options.widest, options.turn / max(bend, 1e-9))
-    return prints_of(cell) if cell > options.cell else prints
+    cell = min(options.widest, options.turn / _bend(sheet, prints.U))
+    return prints_of(cell) if cell > start else prints
+
+
+def _bend(sheet: Sheet, U: Floats) -> float:
+    """Return the curvature that one in a hundred places U (n, 2) exceeds."""
+    k1, k2 = principal_curvatures(sheet.jet(U))
+    return max(float(np.percentile(np.maximum(k1, -k2), 99)), 1e-9)
 
 
 def _columns(
@@ -254,7 +271,7 @@ def _columns(
 ) -> Columns:
     """Return the columns over the blocks' footprint; ``cell`` None chooses its cells' side."""
     sheet = fitted.sheet
-    prints = _footprint(sheet, foot.U, options, cell)
+    prints = _footprint(sheet, foot.U, options, fitted.unit, cell)
     every = np.concatenate([prints.U, prints.ring.U])
     k1, k2 = principal_curvatures(sheet.jet(every))
     curvature = np.stack([k1, -k2])
@@ -322,7 +339,7 @@ def build_control(
     datum : str
         Which surface is flat; see Datum.
     """
-    foot = block_feet(fitted, points, reach=10.0)
+    foot = block_feet(fitted, points, reach=10.0 * fitted.unit)
     columns = _columns(fitted, horizons, foot, None, flatten, options, datum)
     reach = _reach(foot, options)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -100,6 +100,8 @@ class FittedSheet:
     lean, level : float
         Where the sheet was moved onto the surface that layers run parallel to (see conform):
         side and median half thickness.
+    unit : float
+        Side of what it was fitted to, blocks or cells of merged blocks, in the unit of lengths.
     """
 
     sheet: Sheet
@@ -111,6 +113,20 @@ class FittedSheet:
     accepted: float
     lean: float = 0.0
     level: float = 0.0
+    unit: float = 1.0
+
+    def scaled(self, factor: float) -> FittedSheet:
+        """Return the sheet in another unit: lengths times a factor."""
+        return replace(
+            self,
+            sheet=self.sheet.scaled(factor),
+            half=self.half * factor,
+            near=self.near * factor,
+            roughness=self.roughness * factor,
+            smoothing=self.smoothing * factor,
+            level=self.level * factor,
+            unit=self.unit * factor,
+        )
 
     def own_feet(self, Q: Floats, reaches: tuple[float, ...]) -> Foot:
         """Return the feet of points Q (n, 3) of the body on the limb that they belong to.

@@ -61,6 +61,10 @@ class Horizons:
     top: Floats
     bottom: Floats
 
+    def scaled(self, factor: float) -> Horizons:
+        """Return the horizons in another unit: lengths times a factor."""
+        return Horizons(self.grid.scaled(factor), self.top * factor, self.bottom * factor)
+
     def heights(self, u: Floats) -> tuple[Floats, Floats]:
         """Return the bottom's and the top's height at u (n, 2); at least 0.3 block apart."""
         top, bottom = self.grid.value(self.top, u), self.grid.value(self.bottom, u)
@@ -142,9 +146,11 @@ def separate_horizons(
     grid = fitted.sheet.grid
     nodes, _ = fitted.sheet.samples()
     held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
-    still = (options.separate / grid.step) ** 4 * grid.energy(2) + options.stiffness * held
+    still = (options.separate * fitted.unit / grid.step) ** 4 * grid.energy(
+        2
+    ) + options.stiffness * held
     sharp = [fitted.reach(side, fitted.half) for side in (1.0, -1.0)]
-    trust = np.clip(fitted.half - options.blurred, 0.0, 1.0)
+    trust = np.clip(fitted.half / fitted.unit - options.blurred, 0.0, 1.0)
     start = (
         sharp[0] + trust * (hull.top - sharp[0]),
         sharp[1] + trust * (-hull.bottom - sharp[1]),

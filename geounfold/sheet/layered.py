@@ -20,6 +20,7 @@ from geounfold.sheet.displace import (
 )
 from geounfold.sheet.fit import RIDGE, FittedSheet
 from geounfold.sheet.normal import Stencils
+from geounfold.sheet.sites import scatter
 from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import slip_potential
 
@@ -38,12 +39,6 @@ class LayerOptions:
     smooth: tuple[float, ...] = (1.0, 1.6, 2.4, 3.2)
     smooth_half: float = 2.0
     most: int = 12_000
-
-
-def scatter(points: Floats) -> Floats:
-    """Return a number in [0, 1) per point (n,), even and unrelated to the rows' order."""
-    out: Floats = np.mod(points @ np.array([7.1317, 5.7731, 3.3119]), 1.0)
-    return out
 
 
 def layer_heights(t: Floats, half: Floats, clear: float) -> Floats | None:
@@ -125,7 +120,7 @@ def sharpen_layers(
         points = points[scatter(points[:, ::-1]) < options.most / len(points)]
     part = scatter(points) < 0.5
     every = np.ones(len(points), dtype=bool)
-    U = sheet.search(fitted.near, reach=8.0).feet(points).U
+    U = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(points).U
     rough, fine = grid.energy(4), grid.energy(3)
     smooth = options.smooth[len(options.smooth) // 2]
     for turn in range(options.rounds):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -76,6 +76,11 @@ class MedialSheet:
     trusted: Bools
     core_faces: Bools
     normals: Floats
+
+    def scaled(self, factor: float) -> MedialSheet:
+        """Return the medial points in another unit: lengths times a factor."""
+        mesh = self.mesh.with_vertices(self.mesh.V * factor)
+        return replace(self, mesh=mesh, uv=self.uv * factor, half=self.half * factor)
 
 
 def _check_open(mesh: TriMesh) -> None:

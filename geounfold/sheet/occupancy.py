@@ -24,9 +24,12 @@ from geounfold.sheet.displace import (
 )
 from geounfold.sheet.fit import RIDGE, FittedSheet
 from geounfold.sheet.normal import Stencils, gram
-from geounfold.sheet.sites import Sites
+from geounfold.sheet.sites import Sites, scatter
 from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Sheet, slip_potential
+
+_LEAST_SHARE = 0.1  # of the sites far from the rim that is kept
+_THICK = 1.2  # times the half thickness of a thin sheet, from which it is surely none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +47,8 @@ class OccupancyOptions:
     thickness (or half of its median, where that is less) below which, and its slope above
     which, sites are left alone; ``slack``: how far
     sites past those limits are followed all the same, as the sheet moves; ``misfit``: mean
-    depth on the wrong side above which the first fit is kept.
+    depth on the wrong side above which the first fit is kept; ``enough``: sites per coefficient
+    of the sheet up to which all are used, where blocks were merged.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -63,6 +67,17 @@ class OccupancyOptions:
     taper: float = 0.25
     slack: float = 0.5
     misfit: float = 0.01
+    enough: int = 100
+
+    def for_cells(self, side: float) -> OccupancyOptions:
+        """Return the options for a sheet fitted to cells of merged blocks of some side.
+
+        Such a sheet is farther off at first: the margins begin with wider ones.
+        """
+        if side <= 1:
+            return self
+        wider = self.margins[0] * side * 0.5 ** np.arange(np.ceil(np.log2(side)))
+        return replace(self, margins=(*wider.tolist(), *self.margins))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +119,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     options : OccupancyOptions
         See there.
     """
-    fitted, options = _for_thin(fitted, options)
+    fitted, options = _for_thin(fitted, options.for_cells(fitted.unit))
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     places = Places.of(fitted, sites, options)
     rough, fine = grid.energy(4), grid.energy(3)
@@ -120,6 +135,8 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
         views = _views(sheet, nodes, places, use)
         last = _step(sheet, half, nodes, views, margin, smooth, options.smooth_half, rough, fine)
         sheet, half, used = last.sheet, last.half, places.U[use]
+        if not np.isfinite(sheet.C).all():
+            return None
         places.watch(margin, options)
         if margin <= options.adapt and last.wrong > options.tolerated:
             smooth = max(smooth / options.pace, options.least)
@@ -128,6 +145,28 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))
     return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
+
+
+def enough_sites(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Sites:
+    """Return as many sites as a sheet fitted to cells of merged blocks can learn from.
+
+    Those near the rim and where the layer is thin all stay, as they tell each other's kind; of the
+    others an even part.
+    """
+    most = options.enough * fitted.sheet.grid.size
+    if fitted.unit <= 1 or len(sites.points) <= most:
+        return sites
+    grid, rim = fitted.sheet.grid, 2 * (options.rim + fitted.unit)
+    foot = fitted.sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
+    flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
+    half, seen = grid.value(fitted.half, flat), foot.miss < 0.02
+    inside = seen & (half - np.abs(foot.t) > np.minimum(options.depths[0], 0.6 * half))
+    holes = cKDTree(flat[inside & ~sites.occupied])
+    spare = seen & (half > _THICK * options.thin)
+    spare[spare] = holes.query(flat[spare], distance_upper_bound=rim)[0] > rim
+    share = (most - (~spare).sum()) / max(int(spare.sum()), 1)
+    kept = ~spare | (scatter(sites.points) < max(share, _LEAST_SHARE))
+    return Sites(sites.points[kept], sites.occupied[kept])
 
 
 def _for_thin(
@@ -179,7 +218,7 @@ class Places:
         Blocks near both horizons are there twice.
         """
         sheet = fitted.sheet
-        foot = sheet.search(fitted.near, reach=8.0).feet(sites.points)
+        foot = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
         seen = foot.miss < 0.02
         across = np.abs(foot.t) + sheet.grid.value(fitted.half, foot.U)
         twice = across < clearance(options.margins[0]) + options.slack
@@ -237,14 +276,19 @@ class Places:
         the layer tapers steeply, horizon and rim are one.
         """
         beyond, thickness = self.beyond, self.half
-        deep = (thickness > options.thin) & (-beyond > np.minimum(depth, 0.6 * thickness))
-        hole = (~self.sites.occupied & deep) | self._uncovered(options)
-        good = (self.right < clearance(margin)) & (np.abs(beyond) < options.band)
+        hole = self.holes(depth, options)
+        good = (self.right < clearance(margin)) & (np.abs(beyond) < max(options.band, 4 * margin))
         good &= (thickness > options.thinnest) & (self.taper < options.taper)
         use = np.flatnonzero(good)
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=options.rim)[0]
         out: Ints = use[rim > options.rim]
         return out
+
+    def holes(self, depth: float, options: OccupancyOptions) -> Bools:
+        """Return which empty sites lie well inside the layer, (n,): past its rim."""
+        deep = -self.beyond > np.minimum(depth, 0.6 * self.half)
+        deep &= ~self.sites.occupied & (self.half > options.thin)
+        return deep | self._uncovered(options)
 
     def _uncovered(self, options: OccupancyOptions) -> Bools:
         """Return which empty sites lie in a thin layer where no block is near, (n,)."""
@@ -306,11 +350,14 @@ def separating_step(
     stiffness: Stencils,
     pull: Floats,
 ) -> Floats:
-    """Return a Newton step x for ``m - A x``, no coefficient longer than ten margins."""
+    """Return a Newton step x for ``m - A x`` that moves no site by more than ten margins.
+
+    Coefficients past the rim, where the surface is only continued, may move farther.
+    """
     slope = (expit(m / margin) - ~occupied) / knots**2
     bend = 0.25 / np.cosh(np.clip(m / (2 * margin), -20, 20)) ** 2
     weight = np.maximum(bend, 1e-4) / (margin * knots**2)
     K = gram(A, weight, stiffness.shape) + stiffness
     x = K.solver(RIDGE)(A.T @ slope - pull)
-    longest = float(np.abs(x).max())
+    longest = float(np.abs(A @ x).max())
     return x * min(1.0, 10 * margin / longest) if longest > 0 else x

@@ -36,7 +36,7 @@ class Sites:
     occupied: Bools
 
 
-def surface_sites(cells: Ints, steps: Floats) -> Sites:
+def surface_sites(cells: Ints, steps: Floats, judged: Bools | None = None) -> Sites:
     """Return the sites at the surface of the blocks, by their 26 neighbours.
 
     Parameters
@@ -45,27 +45,39 @@ def surface_sites(cells: Ints, steps: Floats) -> Sites:
         Lattice cell of every block.
     steps : (3,) float
         Block sides, working units; cell k lies at ``k * steps``.
+    judged : (n,) bool, optional
+        Distinct blocks whose neighbours are looked at; all by default.  The neighbours of these,
+        and those of empty sites next to these, must be among the blocks.
     """
     low = cells.min(axis=0) - 1
     shape = cells.max(axis=0) - low + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = sorted_distinct((cells - low) @ stride)  # sorted: shifted keys are looked up in order
+    every = (cells - low) @ stride
+    keys = among = sorted_distinct(every)  # sorted: shifted keys are looked up in order
+    if judged is not None:
+        keys = sorted_distinct(every[judged])
     open_ = np.zeros(len(keys), dtype=bool)
     empty = []
     for offset in product((-1, 0, 1), repeat=3):
         if not any(offset):
             continue
         wanted = keys + np.array(offset) @ stride
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        missing = keys[at] != wanted
+        at = np.minimum(np.searchsorted(among, wanted), len(among) - 1)
+        missing = among[at] != wanted
         open_ |= missing
         empty.append(wanted[missing])
     outside, around = np.unique(np.concatenate(empty), return_counts=True)
     pits = around > PIT
     if pits.mean() > PITS:
         outside = outside[~pits]
-    every = np.concatenate([keys[open_], outside])
-    i, rest = np.divmod(every, stride[0])
+    found = np.concatenate([keys[open_], outside])
+    i, rest = np.divmod(found, stride[0])
     j, k = np.divmod(rest, stride[1])
     points = (np.stack([i, j, k], axis=1) + low) * steps
-    return Sites(points, np.arange(len(every)) < int(open_.sum()))
+    return Sites(points, np.arange(len(found)) < int(open_.sum()))
+
+
+def scatter(points: Floats) -> Floats:
+    """Return a number in [0, 1) per point (n,), even and unrelated to the rows' order."""
+    out: Floats = np.mod(points @ np.array([7.1317, 5.7731, 3.3119]), 1.0)
+    return out

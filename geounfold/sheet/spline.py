@@ -98,6 +98,10 @@ class SplineGrid:
         n = np.ceil((high - low) / step).astype(int) + 5
         return SplineGrid(low - 2 * step, step, (int(n[0]), int(n[1])))
 
+    def scaled(self, factor: float) -> SplineGrid:
+        """Return the grid in another unit: lengths times a factor."""
+        return SplineGrid(self.origin * factor, self.step * factor, self.shape)
+
     @property
     def size(self) -> int:
         """Number of coefficients."""

@@ -82,6 +82,16 @@ class Sheet:
         """Return the sheet of other coefficients over the same parameters."""
         return replace(self, C=C)
 
+    def scaled(self, factor: float) -> Sheet:
+        """Return the sheet in another unit: lengths times a factor."""
+        return Sheet(
+            self.grid.scaled(factor),
+            self.C * factor,
+            self.low * factor,
+            self.high * factor,
+            self.cell * factor,
+        )
+
     def samples(self) -> tuple[Floats, Ints]:
         """Return the sampling's parameters (k, 2) and its triangles (m, 3)."""
         n = np.maximum(np.ceil((self.high - self.low) / self.cell).astype(int) + 1, 2)

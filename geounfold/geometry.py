@@ -149,27 +149,30 @@ def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
     (6, [0, 0, 0, 1, 1, 1], [])
     """
     corners = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
-    F = T[:, corners].reshape(-1, 3)
-    low, high = F.min(axis=1), F.max(axis=1)
-    middle = F.sum(axis=1) - low - high
+    a, b, c = (T.T[corners[:, k]].T.ravel() for k in range(3))
+    least, most = np.minimum(a, b), np.maximum(a, b)
+    low, high = np.minimum(least, c), np.maximum(most, c)
+    middle = np.maximum(least, np.minimum(most, c))
     n = int(T.max(initial=0)) + 1
+    fresh = np.ones(len(a), dtype=bool)
     if n**3 < 2**63:
         keys = (low * n + middle) * n + high
-        order = np.argsort(keys, kind="stable")
-        keys = keys[order, None]
+        order = np.argsort(keys)
+        keys = keys[order]
+        fresh[1:] = keys[1:] != keys[:-1]
     else:
         order = np.lexsort((high, middle, low))
-        keys = np.stack([low, middle, high], axis=1)[order]
-    fresh = np.ones(len(F), dtype=bool)
-    fresh[1:] = (keys[1:] != keys[:-1]).any(axis=1)
-    group = np.cumsum(fresh) - 1
-    count = np.bincount(group)
-    follows_low = F[np.arange(len(F)), (F.argmin(axis=1) + 1) % 3]
-    side = np.where(follows_low == middle, 1, -1)[order]
-    sound = (count == 1) | ((count == 2) & (np.bincount(group, weights=side) == 0))
-    once = order[count[group] == 1]
-    once.sort()
-    return F[once], once // 4, np.unique(order[~sound[group]] // 4)
+        rows = np.stack([low, middle, high], axis=1)[order]
+        fresh[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    start = np.flatnonzero(fresh)
+    count = np.diff(start, append=len(a))
+    once = np.sort(order[start[count == 1]])
+    first, second = order[start[count == 2]], order[start[count == 2] + 1]
+    even = np.where(low == a, middle == b, np.where(low == b, middle == c, middle == a))
+    alike = even[first] == even[second]
+    crowded = order[np.repeat(count > 2, count)]
+    misglued = np.concatenate([first[alike], second[alike], crowded])
+    return np.stack([a, b, c], axis=1)[once], once // 4, np.unique(misglued // 4)
 
 
 def bilateral_normals(mesh: TriMesh, adjacency: Ints, sweeps: int, width: float = 0.12) -> Floats:

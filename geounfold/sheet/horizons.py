@@ -163,7 +163,7 @@ def separate_horizons(
         use = places.explained(margin, occupancy.depths[-1], occupancy)
         above = places.side[use] > 0
         rise = [
-            _rise(places, mine, grid, margin, still, now - first)
+            _rise(places, mine, grid, margin, still, now - first, fitted.unit <= 1)
             for mine, now, first in zip((use[above], use[~above]), reach, start, strict=True)
         ]
         reach = (reach[0] + rise[0], reach[1] + rise[1])
@@ -172,9 +172,15 @@ def separate_horizons(
 
 
 def _rise(
-    places: Places, use: Ints, grid: SplineGrid, margin: float, still: Stencils, rest: Floats
+    places: Places,
+    use: Ints,
+    grid: SplineGrid,
+    margin: float,
+    still: Stencils,
+    rest: Floats,
+    held: bool,
 ) -> Floats:
     """Return a Newton step of a horizon's reach, outwards, from some of the sites."""
     H, occupied = grid.basis(places.flat[use]), places.sites.occupied[use]
     height = places.beyond[use]
-    return separating_step(H, height, occupied, margin, grid.step, still, still @ rest)
+    return separating_step(H, height, occupied, margin, grid.step, still, still @ rest, held)

@@ -28,6 +28,7 @@ from geounfold.sheet.sites import Sites, scatter
 from geounfold.sheet.spline import SplineGrid, density_weights
 from geounfold.sheet.surface import Sheet, slip_potential
 
+_HOPELESS = 0.03  # blocks: mean depth on the wrong side that cells of merged blocks never mend
 _LEAST_SHARE = 0.1  # of the sites far from the rim that is kept
 _THICK = 1.2  # times the half thickness of a thin sheet, from which it is surely none
 
@@ -48,7 +49,8 @@ class OccupancyOptions:
     which, sites are left alone; ``slack``: how far
     sites past those limits are followed all the same, as the sheet moves; ``misfit``: mean
     depth on the wrong side above which the first fit is kept; ``enough``: sites per coefficient
-    of the sheet up to which all are used, where blocks were merged.
+    of the sheet up to which all are used, where blocks were merged; ``held``: whether steps are
+    limited past the rim as well, where the sheet is but continued.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -68,6 +70,7 @@ class OccupancyOptions:
     slack: float = 0.5
     misfit: float = 0.01
     enough: int = 100
+    held: bool = True
 
     def for_cells(self, side: float) -> OccupancyOptions:
         """Return the options for a sheet fitted to cells of merged blocks of some side.
@@ -77,7 +80,7 @@ class OccupancyOptions:
         if side <= 1:
             return self
         wider = self.margins[0] * side * 0.5 ** np.arange(np.ceil(np.log2(side)))
-        return replace(self, margins=(*wider.tolist(), *self.margins))
+        return replace(self, margins=(*wider.tolist(), *self.margins), held=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +136,20 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
             return None
         nodes = node_normals(sheet)
         views = _views(sheet, nodes, places, use)
-        last = _step(sheet, half, nodes, views, margin, smooth, options.smooth_half, rough, fine)
+        last = _step(
+            sheet,
+            half,
+            nodes,
+            views,
+            margin,
+            smooth,
+            options.smooth_half,
+            rough,
+            fine,
+            options.held,
+        )
         sheet, half, used = last.sheet, last.half, places.U[use]
-        if not np.isfinite(sheet.C).all():
+        if not np.isfinite(sheet.C).all() or (k and not options.held and last.depth > _HOPELESS):
             return None
         places.watch(margin, options)
         if margin <= options.adapt and last.wrong > options.tolerated:
@@ -318,6 +332,7 @@ def _step(
     smooth_half: float,
     rough: Stencils,
     fine: Stencils,
+    held: bool,
 ) -> _Round:
     """Take one Newton step in the surface, then one in the half thickness.
 
@@ -330,10 +345,10 @@ def _step(
     pull = np.einsum("ij,ij->i", nodes, rough @ sheet.C)
     m = views.height - views.H @ half
     stiffness = stiff * rough.between(nodes)
-    z = separating_step(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull)
+    z = separating_step(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull, held)
     m = m - views.A @ z
     even = (smooth_half / knots) ** 6 * fine
-    dh = separating_step(views.H, m, views.occupied, margin, knots, even, even @ half)
+    dh = separating_step(views.H, m, views.occupied, margin, knots, even, even @ half, held)
     m = m - views.H @ dh
     wrong = np.where(views.occupied, m, -m)
     moved = sheet.with_coefficients(sheet.C + nodes * z[:, None])
@@ -349,15 +364,16 @@ def separating_step(
     knots: float,
     stiffness: Stencils,
     pull: Floats,
+    held: bool,
 ) -> Floats:
     """Return a Newton step x for ``m - A x`` that moves no site by more than ten margins.
 
-    Coefficients past the rim, where the surface is only continued, may move farther.
+    ``held``: nor any coefficient, past the rim or not.
     """
     slope = (expit(m / margin) - ~occupied) / knots**2
     bend = 0.25 / np.cosh(np.clip(m / (2 * margin), -20, 20)) ** 2
     weight = np.maximum(bend, 1e-4) / (margin * knots**2)
     K = gram(A, weight, stiffness.shape) + stiffness
     x = K.solver(RIDGE)(A.T @ slope - pull)
-    longest = float(np.abs(A @ x).max())
+    longest = float(np.abs(x if held else A @ x).max())
     return x * min(1.0, 10 * margin / longest) if longest > 0 else x

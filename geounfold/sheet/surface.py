@@ -135,6 +135,7 @@ class FootSearch:
         _, face, closest = self.index.closest(Q)
         corners = self.F[face]
         weights = barycentric_in_triangles(closest, self.index.V, corners)
+        weights = np.where(np.isfinite(weights), weights, 1 / 3)  # where a triangle has no area
         U = np.einsum("ij,ijk->ik", weights, self.U[corners])
         for _ in range(newton):
             U = U + newton_step(self.sheet, Q, self.sheet.jet(U))

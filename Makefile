@@ -73,7 +73,8 @@ soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on whe
 
 study: $(STAMP)  ## krige in folded, unfolded and true space, in 30 minutes; goes on where stopped
 	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)
-	$(BIN)/python tests/study/tables.py data/study.csv -o data/study.md --figure data/study.png
+	$(BIN)/python tests/study/tables.py data/study.csv -o docs/study.md \
+	    --figure docs/assets/study.png --link assets/study.png
 
 notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each; RUNS: times taken
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py

@@ -76,8 +76,8 @@ INTRODUCTION = """# Does it pay?
 
 Grades are simulated in the true flat space of simulated bodies, drilled in the folded one
 (vertical, inclined and fanned holes), and kriged at blocks drawn from it. The arms differ by
-nothing but the coordinates: each has the same samples, the same automatic fit of a variogram, and the 24 nearest
-samples, no more than 6 of a hole.
+nothing but the coordinates: each has the same samples, the same automatic fit of a variogram, and
+the 24 nearest samples, no more than 6 of a hole.
 
 | arm | coordinates |
 |---|---|

@@ -273,9 +273,38 @@ def test_metal_is_kept_from_the_fold_to_the_grid_and_back(tmp_path: Path) -> Non
     assert total == pytest.approx((frame["au"] * 1000).sum(), rel=0.01)
 
 
+@pytest.mark.parametrize("how", ["columns", "lengths"])
+def test_unfold_tells_volumes_where_sides_are_known(tmp_path: Path, how: str) -> None:
+    body = gu.simulate("plunging", blocks=4000)  # blocks of 10 m
+    frame = pd.DataFrame(body.folded, columns=["x", "y", "z"])
+    words = ["--sizes", "10,10,10"]
+    if how == "columns":
+        frame[["XINC", "YINC", "ZINC"]] = 10.0
+        frame.loc[3, "YINC"] = 0.0
+        words = []
+    blocks, flat, summary = (str(tmp_path / n) for n in ("b.csv", "f.csv", "s.json"))
+    frame.to_csv(blocks, index=False)
+    run = ["unfold", blocks, "-o", flat, "--summary", summary, "--quiet", *words]
+    assert main(run) == 0
+    result, facts = pd.read_csv(flat), json.loads(Path(summary).read_text())
+    known = result["block_volume"].notna()
+    assert (result.loc[known, "block_volume"] == 1000).all()
+    assert known.sum() == len(frame) - (how == "columns")
+    expected = result["block_volume"] * result["volume_ratio"]
+    pd.testing.assert_series_equal(result["unfolded_volume"], expected, check_names=False)
+    told = facts["block_volumes"]
+    assert told["folded"] == 1000 * known.sum()
+    assert told["without_sides"] == (how == "columns")
+    # Flexural slip keeps volume: what is left is tetrahedra for curved prisms, below 1 %.
+    assert told["unfolded"] == pytest.approx(told["folded"], rel=0.01)
+    assert any("no positive sides" in w for w in facts["warnings"]) == (how == "columns")
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        (["unfold", "P", "-o", "O.csv", "--sizes", "a,b,c"], "no column 'a' for --sizes"),
+        (["unfold", "P", "-o", "O.csv", "--sizes", "1,0,1"], "three positive lengths"),
         (["grid", "P", "-o", "G.csv", "--sizes", "5,5"], "--sizes needs three numbers"),
         (["grid", "P", "-o", "G.csv", "--sizes", "5,5,-1"], "three positive sides"),
         (["transfer", "M.npz", "P", "P", "-o", "O.csv", "--values", "au"], "M.npz"),

@@ -28,7 +28,7 @@ def _small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streams, "LARGE", 0)
 
 
-def made(points: np.ndarray, _: slice) -> dict[str, object]:
+def made(_: pd.DataFrame, points: np.ndarray, __: slice) -> dict[str, object]:
     """Results that depend on the points alone; one replaces a column of the input."""
     return {"flat": points.sum(axis=1), "note": np.where(points[:, 0] > 0, "a", "b,c")}
 
@@ -186,7 +186,7 @@ def test_a_file_that_changes_meanwhile_is_an_error(tmp_path):
 def test_results_never_replace_the_coordinates_read(tmp_path):
     stream = open_points(text_file(tmp_path / "in.csv"))
     with pytest.raises(InputError, match="would replace the coordinates"):
-        stream.write_parts(tmp_path / "out.csv", lambda points, _: {"x": points[:, 0]})
+        stream.write_parts(tmp_path / "out.csv", lambda _, points, __: {"x": points[:, 0]})
 
 
 def test_the_command_line_writes_the_same_in_batches(tmp_path, monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ import pandas as pd
 from geounfold.blockmodel.model import BlockModel
 from geounfold.errors import InputError
 from geounfold.io._text import listing
-from geounfold.io.coordinates import Triple, numbers, plain_name
+from geounfold.io.coordinates import Triple, numbers, plain_name, readable_numbers
 from geounfold.lattice import measure_lattice
 from geounfold.mesh import Floats
 
@@ -46,6 +47,28 @@ def size_columns(names: Sequence[str]) -> Triple | None:
         )
     a, b, c = (names[plain.index(name)] for name in found[0])
     return a, b, c
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Where a table's blocks have their sides: in three columns, or the same for all.
+
+    Attributes
+    ----------
+    given : three str or three float
+    """
+
+    given: Triple | tuple[float, float, float]
+
+    def of(self, frame: pd.DataFrame) -> Floats:
+        """Return the sides (n, 3) of a table's rows; NaN where they are no positive numbers."""
+        if isinstance(self.given[0], str):
+            read = [readable_numbers(frame[name])[0] for name in self.given]
+            sides = np.column_stack(read)
+        else:
+            sides = np.broadcast_to(np.array(self.given, dtype=np.float64), (len(frame), 3)).copy()
+        out: Floats = np.where((sides > 0) & np.isfinite(sides), sides, np.nan)
+        return out
 
 
 def block_model(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from geounfold.cli.blocks import BlockVolumes
 from geounfold.cli.console import Console
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.cli.table import table_text
@@ -32,6 +33,8 @@ from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from geounfold.io.streams import PointStream
     from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Bools, Floats, TriMesh
@@ -81,6 +84,8 @@ def unfold(args: Namespace, console: Console) -> None:
     _check_mesh_outputs(args, options)
     table = _open(args, console, args.output, whole=args.report is not None)
     table.check_writable(args.output)
+    names = table.frame.columns if isinstance(table, PointTable) else table.rows.names
+    volumes = BlockVolumes(args.sizes, [str(name) for name in names], args.points)
     samples = _read_samples(args, console)
     holes = read_holes(args, console)
     surfaces = {
@@ -107,7 +112,11 @@ def unfold(args: Namespace, console: Console) -> None:
         summary["warnings"] = [*warnings, *holes.holes.messages()]  # said when they were read
     console.stage("writing")
     with outputs.writing() as parts:
-        table.write_parts(parts["--output"], lambda _, rows: _results(result, rows))
+        table.write_parts(
+            parts["--output"], lambda frame, _, rows: _results(result, rows, frame, volumes)
+        )
+        summary.update(volumes.facts())
+        summary["warnings"] = [*summary.get("warnings", []), *volumes.warnings()]
         if samples is not None and carried is not None:
             samples.write(parts["--samples-out"], carried)
         if holes is not None:
@@ -125,12 +134,12 @@ def unfold(args: Namespace, console: Console) -> None:
             from geounfold.cli.reporting import report_columns, report_holes
             from geounfold.report import write_report
 
-            columns = _results(result, slice(0, len(table)))
+            columns = _results(result, slice(0, len(table)))  # volumes are not drawn
             drawn = report_columns(table, columns)
             drilled = report_holes(holes, traced, samples, carried)
             blocks = table.points, result.points
             write_report(parts["--report"], summary, *blocks, drawn, holes=drilled)
-    for warning in warnings:
+    for warning in (*warnings, *volumes.warnings()):
         console.warn(str(warning))
     if carried is not None:
         _warn_of_outside(args.samples, _places(carried), console)
@@ -150,10 +159,18 @@ def _check_mesh_outputs(args: Namespace, options: UnfoldOptions) -> None:
                 raise OptionError(no_mesh(options.method, f"{name} has nothing to write"))
 
 
-def _results(result: Unfolding, rows: slice) -> dict[str, Any]:
+def _results(
+    result: Unfolding,
+    rows: slice,
+    frame: pd.DataFrame | None = None,
+    volumes: BlockVolumes | None = None,
+) -> dict[str, Any]:
     """Return all results of some of the points, by output column."""
     distortion = {name: values[rows] for name, values in result.columns.items()}
-    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion
+    found = result_columns(UNFOLDED, result.carried.part(rows)) | distortion
+    if frame is None or volumes is None:
+        return found
+    return found | volumes.columns(frame, distortion)
 
 
 def carry(args: Namespace, console: Console) -> None:
@@ -197,7 +214,7 @@ def carry(args: Namespace, console: Console) -> None:
     places: Counter[str] = Counter()
     unsolved: list[int] = []
 
-    def carried(points: Floats, _: slice) -> dict[str, Any]:
+    def carried(_: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
         there = saved.carry(points, inverse=args.inverse)
         found = result_columns(names, there)
         places.update(_places(found))

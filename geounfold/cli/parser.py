@@ -35,6 +35,7 @@ _UNFOLD = (
     _RESULTS
     + """\
   volume_ratio, nmd_error, stretch_min, stretch_max, shear   distortion of each block
+  block_volume, unfolded_volume   where the blocks' sides are known (see --sizes)
 
 Every input column and row comes back in order. An input column called as a result is replaced
 in its place. Output tables are separated by commas, whatever the input's separator."""
@@ -332,6 +333,12 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument("--report", metavar="R.html", help="verdict, 3-D views, figures")
     parser.add_argument(
         "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
+    )
+    parser.add_argument(
+        "--sizes",
+        metavar="X,Y,Z",
+        help="sides of the blocks, for their volumes: three columns (XINC, dx and alike are "
+        "found) or lengths",
     )
     parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_POINTS}")
     parser.add_argument("--samples-out", metavar="Q", help="where they, or the holes' samples, go")

@@ -93,10 +93,10 @@ class PointTable:
         write_table(path, frame, text=own, columns=self.columns, meta=self.meta)
 
     def write_parts(
-        self, path: str | Path, make: Callable[[Floats, slice], dict[str, Any]]
+        self, path: str | Path, make: Callable[[pd.DataFrame, Floats, slice], dict[str, Any]]
     ) -> None:
         """Write the table with the results that `make` returns for the points and their rows."""
-        self.write(path, make(self.points, slice(0, len(self))))
+        self.write(path, make(self.frame, self.points, slice(0, len(self))))
 
     def check_writable(self, path: str | Path) -> None:
         """Raise OutputError where a file of this ending cannot hold the table's columns."""

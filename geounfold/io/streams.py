@@ -47,8 +47,8 @@ _FAULTS = (
 )
 """What readers raise on files that are no sound tables, Arrow's and pandas's errors included."""
 
-Make = Callable[[Floats, slice], dict[str, Any]]
-"""Returns the result's columns for points (k, 3), which are these rows of all."""
+Make = Callable[[pd.DataFrame, Floats, slice], dict[str, Any]]
+"""Returns the result's columns for a batch: its table, its points (k, 3), which rows of all."""
 
 
 class Source(Protocol):
@@ -206,7 +206,7 @@ class PointStream:
         kinds = self._kinds() if typed else {}
         with tables.table_writer(path) as write:
             for frame, points, rows in self._parts():
-                results = make(points, rows)
+                results = make(frame, points, rows)
                 clash = [name for name in self.columns if name in results]
                 if clash:
                     raise InputError(

@@ -163,8 +163,6 @@ def fit_body(
     horizons = fit_horizons(hull, samples, options.fit.knots, options.horizons).scaled(unit)
     if used is not None and sharpened:
         horizons = separate_horizons(fitted, horizons, used, options.horizons, options.occupancy)
-    if coarse is not None:  # the blocks at the surface lie as far out as any
-        points = points[coarse.border] if sites is None else sites.points[sites.occupied]
     mesh = build_control(fitted, horizons, points, blocks, flatten, options.control, datum)
     if coarse is not None and not mesh.sound:
         raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")

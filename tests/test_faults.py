@@ -39,13 +39,21 @@ SHEET = ("reading", "frame", "hull", "split", "sheet", "map", "quality", "writin
 THESIS = ("reading", "frame", "hull", "split", "thesis", "map", "quality", "writing")
 
 
+def heed_stops() -> None:
+    """Undo what the tests' own caller may have set, and a run would heed.
+
+    ``nohup`` ignores hang-ups, and a shell interruptions of what it runs in the background.
+    """
+    for stop in (signal.SIGHUP, signal.SIGINT):
+        signal.signal(stop, signal.SIG_DFL)
+
+
 class Run:
     """A command in a process whose stderr is a terminal."""
 
     def __init__(self, *argv: str, cwd: Path, script: str = "", **settings: object) -> None:
         self._master, slave = pty.openpty()
-        # Whoever runs the tests may ignore hang-ups (nohup does), which a run would heed.
-        settings.setdefault("preexec_fn", lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL))
+        settings.setdefault("preexec_fn", heed_stops)
         how = ["-c", script] if script else ["-m", "geounfold"]
         self.process = subprocess.Popen(
             [sys.executable, *how, *argv],

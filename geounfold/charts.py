@@ -40,7 +40,7 @@ def chart_histogram(table: pd.DataFrame, grade: str) -> Figure:
     figure, (axes,) = _figure(1, (5.0, 3.4))
     low, high = table["low"].to_numpy(), table["high"].to_numpy()
     axes.bar(low, table["share"], width=high - low, align="edge", color=BARS, edgecolor="white")
-    axes.set(xlabel=grade, ylabel="share of samples")
+    axes.set(xlabel=_plain(grade), ylabel="share of samples")
     right = axes.twinx()
     right.step(high, table["cumulative"], where="pre", color=MEAN)
     right.set(ylim=(0, 1.02), ylabel="cumulative share")
@@ -62,7 +62,7 @@ def chart_layers(table: pd.DataFrame, grade: str) -> Figure:
         axes.annotate(
             f"{count}", (1.01, where), xycoords=("axes fraction", "data"), fontsize=7, va="center"
         )
-    axes.set(xlabel=grade, ylabel="stratigraphic height (0 bottom, 1 top)", ylim=(0, 1))
+    axes.set(xlabel=_plain(grade), ylabel="stratigraphic height (0 bottom, 1 top)", ylim=(0, 1))
     axes.legend(frameon=False, fontsize="small")
     return figure
 
@@ -127,9 +127,14 @@ def _profile(axes: Axes, table: pd.DataFrame, grade: str) -> None:
     right.set_ylim(0, 3 * max(int(count.max()), 1))
     error = (table["std"] / np.sqrt(np.maximum(count, 1))).fillna(0.0)
     axes.errorbar(0.5 * (low + high), table["mean"], error, fmt="o-", color=MEAN, markersize=3)
-    axes.set_ylabel(f"mean {grade}")
+    axes.set_ylabel(f"mean {_plain(grade)}")
     axes.set_zorder(right.get_zorder() + 1)
     axes.patch.set_visible(False)
+
+
+def _plain(name: str) -> str:
+    """Return a column's name in which matplotlib sees no formula."""
+    return name.replace("$", r"\$")
 
 
 def _figure(panels: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:

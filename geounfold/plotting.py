@@ -13,6 +13,7 @@ import importlib
 import io
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -347,6 +348,19 @@ def png(figure: Figure) -> bytes:
     """Return a figure as PNG bytes, the same for the same figure."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", facecolor="white", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def svg(figure: Figure) -> bytes:
+    """Return a figure as SVG bytes, the same for the same figure; letters are left to the reader.
+
+    What the drawing library has no letters for, the reader's fonts may have: it does not warn.
+    """
+    buffer = io.BytesIO()
+    how = {"svg.hashsalt": "geounfold", "svg.fonttype": "none"}
+    with require("matplotlib").rc_context(how), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        figure.savefig(buffer, format="svg", facecolor="white", metadata={"Date": None})
     return buffer.getvalue()
 
 

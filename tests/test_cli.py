@@ -163,8 +163,16 @@ def test_unfold_writes_everything(
     seen: dict[str, Any] = {}
 
     def write_report(
-        path: Path, summary: Any, folded: Any, unfolded: Any, columns: Any, *, holes: Any
+        path: Path,
+        summary: Any,
+        folded: Any,
+        unfolded: Any,
+        columns: Any,
+        *,
+        holes: Any,
+        exploration: Any,
     ) -> None:
+        assert exploration is None  # without --grade
         seen.update(summary=summary, folded=folded, unfolded=unfolded, columns=columns, holes=holes)
         path.write_text("<html>")
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from geounfold.cli.blocks import BlockVolumes
 from geounfold.cli.console import Console
+from geounfold.cli.exploring import check_grade_options, exploration, graded_samples
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.cli.table import table_text
 from geounfold.errors import InputError, OptionError, OutputError
@@ -62,6 +63,7 @@ def unfold(args: Namespace, console: Console) -> None:
     if args.holes is None and (args.samples is None) != (args.samples_out is None):
         raise OptionError("--samples and --samples-out belong together: give both or neither")
     check_hole_options(args)
+    check_grade_options(args)
     outputs = Outputs.planned(
         {
             "--output": (args.output, _POINTS_OUT),
@@ -88,6 +90,7 @@ def unfold(args: Namespace, console: Console) -> None:
     volumes = BlockVolumes(args.sizes, [str(name) for name in names], args.points)
     samples = _read_samples(args, console)
     holes = read_holes(args, console)
+    graded = graded_samples(args, samples, holes)
     surfaces = {
         side: None if path is None else read_surface(path)
         for side, path in (("top", args.top), ("bottom", args.bottom))
@@ -110,6 +113,11 @@ def unfold(args: Namespace, console: Console) -> None:
     if holes is not None:
         summary["drillholes"] = holes.facts(traced)
         summary["warnings"] = [*warnings, *holes.holes.messages()]  # said when they were read
+    explored = None
+    if graded is not None:
+        console.stage(f"exploring {args.grade}")
+        explored = exploration(args, result, graded)
+        summary["exploration"] = explored.summary()
     console.stage("writing")
     with outputs.writing() as parts:
         table.write_parts(
@@ -138,7 +146,9 @@ def unfold(args: Namespace, console: Console) -> None:
             drawn = report_columns(table, columns)
             drilled = report_holes(holes, traced, samples, carried)
             blocks = table.points, result.points
-            write_report(parts["--report"], summary, *blocks, drawn, holes=drilled)
+            write_report(
+                parts["--report"], summary, *blocks, drawn, holes=drilled, exploration=explored
+            )
     for warning in (*warnings, *volumes.warnings()):
         console.warn(str(warning))
     if carried is not None:

@@ -346,6 +346,12 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
         "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
     )
     parser.add_argument(
+        "--grade",
+        metavar="NAME",
+        help="a column of the samples or assays to explore in the report: histogram, layers, "
+        "variograms in both spaces, swaths, contacts",
+    )
+    parser.add_argument(
         "--top", metavar="T", help="the top surface: a mesh file or a table (see below)"
     )
     parser.add_argument("--bottom", metavar="B", help="the bottom surface")

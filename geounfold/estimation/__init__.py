@@ -7,7 +7,12 @@ the samples first, `scores` judges. The systems are solved by gstlearn (extra ``
 
 from geounfold.estimation.estimate import Estimation, FlatSamples, estimate, flat_samples
 from geounfold.estimation.exploration import Exploration, contact, explore, histogram, swath
-from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
+from geounfold.estimation.fit import (
+    FEWEST_SAMPLES,
+    FittedVariogram,
+    directional,
+    fit_variogram,
+)
 from geounfold.estimation.kriging import (
     FLAGS,
     METHODS,
@@ -21,6 +26,7 @@ from geounfold.estimation.scores import Scores, conservation, grade_tonnage, sco
 from geounfold.estimation.variogram import KINDS, Structure, Variogram, from_json
 
 __all__ = [
+    "FEWEST_SAMPLES",
     "FLAGS",
     "KINDS",
     "METHODS",

@@ -46,6 +46,26 @@ class Exploration:
     swaths: Mapping[str, pd.DataFrame]
     contacts: Mapping[str, pd.DataFrame]
 
+    def summary(self) -> dict[str, Any]:
+        """Return every table as plain numbers by column, for JSON; None where there is none."""
+        models = {
+            space: {**fitted.model.facts(), "misfit": fitted.misfit}
+            for space, fitted in self.models.items()
+        }
+        several = ("variograms", "swaths", "contacts")
+        return {
+            "grade": self.grade,
+            "samples": self.samples.facts(),
+            "statistics": {k: _number(v) for k, v in statistics(self.samples.grades).items()},
+            "histogram": _lists(self.histogram),
+            "layers": _lists(self.layers),
+            "models": models,
+            **{
+                name: {key: _lists(table) for key, table in getattr(self, name).items()}
+                for name in several
+            },
+        }
+
 
 def explore(
     unfolding: Any,
@@ -221,3 +241,13 @@ def _known(values: Floats) -> Floats:
     if not len(v):
         raise InputError("there are no values")
     return v
+
+
+def _lists(table: pd.DataFrame) -> dict[str, list[Any]]:
+    """Return a table's columns as lists."""
+    return {str(n): [_number(v) for v in table[n].tolist()] for n in table.columns}
+
+
+def _number(value: Any) -> Any:
+    """Return None for a float that is no number, and anything else as it is."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value

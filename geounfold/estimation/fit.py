@@ -35,6 +35,9 @@ ANISOTROPIES: tuple[str, ...] = get_args(Anisotropy)
 MOST_SAMPLES = 3000
 """Of more, so many are drawn, always the same ones: pairs grow with their square."""
 
+FEWEST_SAMPLES = 20
+"""With fewer there is no variogram."""
+
 _BINS = {1: 24, 2: 12, 3: 7}  # bins along each axis
 _FINER = 1.5  # exponent of the bins' edges: they are finer near none
 _PAIRS = 10  # fewest pairs of a bin
@@ -217,8 +220,8 @@ def _checked(
         raise InputError(f"samples need points (n, 3) and values (n,), not {P.shape}, {v.shape}")
     good = np.isfinite(P).all(axis=1) & np.isfinite(v)
     P, v = P[good], v[good]
-    if len(v) < 20:
-        raise InputError(f"only {len(v)} samples: a variogram needs at least 20")
+    if len(v) < FEWEST_SAMPLES:
+        raise InputError(f"only {len(v)} samples: a variogram needs at least {FEWEST_SAMPLES}")
     if not np.ptp(v) > 0:
         raise InputError("all samples have the same value: there is no variogram")
     order = np.lexsort((v, *P.T))

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,7 @@ from geounfold.plotting import ViewOptions, check_rendering
 from geounfold.quality import NEIGHBOURS, neighbours, nmd
 from geounfold.report.charts import distribution
 from geounfold.report.columns import MEANINGS
+from geounfold.report.exploration import exploration_html
 from geounfold.report.payload import CarriedHoles, payload
 from geounfold.report.pictures import pictures
 from geounfold.report.private import without_folders
@@ -41,6 +42,9 @@ from geounfold.report.words import (
     text,
 )
 
+if TYPE_CHECKING:
+    from geounfold.estimation import Exploration
+
 _SCRIPTS = ("decode", "colour", "camera", "renderer", "view", "inspect", "controls", "main")
 _PLACES = ("unfolded_x", "unfolded_y", "unfolded_z")  # told by the blocks' places themselves
 _DISTRIBUTED = ("nmd_error", "volume_ratio", "shear", "stretch_max", "stretch_min")
@@ -54,6 +58,7 @@ def write_report(
     columns: Mapping[str, ArrayLike],
     *,
     holes: CarriedHoles | None = None,
+    exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> None:
     """Write the report of an unfolding; see `report_html` for parameters and errors.
@@ -63,7 +68,9 @@ def write_report(
     path : path
         Where to write; an existing file is replaced.
     """
-    page = report_html(summary, folded, unfolded, columns, holes=holes, view=view)
+    page = report_html(
+        summary, folded, unfolded, columns, holes=holes, exploration=exploration, view=view
+    )
     Path(path).write_text(page, encoding="utf-8")
 
 
@@ -74,6 +81,7 @@ def report_html(
     columns: Mapping[str, ArrayLike],
     *,
     holes: CarriedHoles | None = None,
+    exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> str:
     """Return the report of an unfolding as one HTML page without outer references.
@@ -92,6 +100,8 @@ def report_html(
         Those of the result must be finite wherever there is an image.
     holes : CarriedHoles, optional
         Drill-holes carried with the body.
+    exploration : Exploration, optional
+        What a grade of the samples carried with the body tells in both spaces.
     view : ViewOptions, optional
         Where bodies are looked at from.
 
@@ -124,6 +134,7 @@ def report_html(
         folded_up("Still pictures", "\n".join(stills), "stills"),
         section("Figures", _tiles(summary)),
         section("Distributions over the blocks", "\n".join(_distributions(body.results))),
+        _explored(exploration),
         section("Elements at fault", _flaws(summary)),
         section("Cross-check of meshes", _crosscheck(summary)),
         '<div class="duo">',
@@ -276,6 +287,14 @@ def _distributions(drawn: Mapping[str, Floats]) -> Iterator[str]:
             label, meaning, _ = MEANINGS[name]
             charts = distribution(drawn[name], label)
             yield f'<h3>{text(name)}</h3><p class="soft">{text(meaning)}</p>{charts}'
+
+
+def _explored(exploration: Exploration | None) -> str:
+    if exploration is None:
+        return ""
+    return section(
+        f"Exploratory data analysis of {exploration.grade}", exploration_html(exploration)
+    )
 
 
 _CERTIFIED = {

@@ -63,7 +63,9 @@ def chart_layers(table: pd.DataFrame, grade: str) -> Figure:
             f"{count}", (1.01, where), xycoords=("axes fraction", "data"), fontsize=7, va="center"
         )
     axes.set(xlabel=_plain(grade), ylabel="stratigraphic height (0 bottom, 1 top)", ylim=(0, 1))
-    axes.legend(frameon=False, fontsize="small")
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize="small"
+    )
     return figure
 
 

@@ -525,9 +525,10 @@ def _with_memory(megabytes: int, argv: tuple[str, ...], folder: Path) -> int:
     return status
 
 
-@pytest.mark.parametrize("megabytes", [100, 600])
+@pytest.mark.parametrize("megabytes", [100, 350, 600])
 def test_memory_limit(megabytes: int, folder: Path) -> None:
-    # 100 MB do not hold numpy; loading the libraries takes 800 MB of addresses, so none suffices.
+    # 100 MB do not hold numpy, 350 not the threads of its BLAS; loading the libraries takes 800 MB
+    # of addresses, so none suffices.
     assert _with_memory(megabytes, UNFOLD, folder) == 1
 
 

@@ -69,6 +69,8 @@ def supervised(run: Run, console: Console, *, verbose: bool = False) -> int:
         os.close(notes)
         os.close(noise)
         _die_with(parent)
+        if memory_is_limited():  # OpenBLAS tries for ever where its threads find no memory
+            os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         if not verbose:
             _keep_aside(stderr)
         with stoppable(restore=False):

@@ -174,7 +174,10 @@ def into_readme(text: str) -> None:
 
 
 def profile(python: str, folder: Path, blocks: int, out: Path) -> None:
-    """Draw where the time of a run goes: the calls that take 3 % and more, by depth."""
+    """Draw where the time of a run goes: the calls that take 3 % and more, by depth.
+
+    Calls that only pass on to one that takes nearly all of their time are left out.
+    """
     stem = folder / f"scale_{blocks}"
     if not stem.with_suffix(".csv").exists():
         run(python, MAKE, str(blocks), str(stem))
@@ -184,25 +187,35 @@ def profile(python: str, folder: Path, blocks: int, out: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(9, 3.2), dpi=90)
-    colours = plt.get_cmap("tab20").colors
+    figure, axes = plt.subplots(figsize=(11, 3.6), dpi=90)
+    colours = plt.get_cmap("Pastel2").colors
     total = root["time"]
+
+    def heaviest(frame: dict) -> list[dict]:
+        """Return a frame's calls, the heaviest first; wrappers give way to what they call."""
+        calls = []
+        for child in frame.get("children", []):
+            inner = max(child.get("children", []), key=lambda c: c["time"], default=None)
+            passed = inner is not None and inner["time"] > 0.93 * child["time"]
+            wrapper = child["function"].startswith(("<", "_", "inner", "__")) and passed
+            calls += heaviest(child) if wrapper else [child]
+        return sorted(calls, key=lambda c: -c["time"])
 
     def draw(frame: dict, left: float, depth: int) -> int:
         deepest, at = depth, left
-        for child in sorted(frame.get("children", []), key=lambda c: -c["time"]):
+        for child in heaviest(frame):
             name, share = child["function"], child["time"] / total
-            if share >= 0.03 and depth < 7:
-                axes.barh(
+            if share >= 0.03 and depth < 8:
+                box = axes.barh(
                     -depth,
                     share,
                     left=at,
                     height=0.9,
                     edgecolor="white",
-                    color=colours[hash_of(name) % 20],
+                    color=colours[hash_of(name) % len(colours)],
                 )
-                fits = int(share * 130)
-                axes.text(at + 0.003, -depth, name[:fits], va="center", fontsize=7, clip_on=True)
+                word = axes.text(at + 0.003, -depth, name, va="center", fontsize=7.5)
+                word.set_clip_path(box[0])
                 deepest = max(deepest, draw(child, at, depth + 1))
             at += share
         return deepest

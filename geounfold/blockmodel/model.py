@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -240,9 +239,3 @@ def regular_grid(points: Floats, sizes: Floats) -> BlockModel:
     z, y, x = np.meshgrid(ticks[2], ticks[1], ticks[0], indexing="ij")  # x fastest, as in GSLIB
     centroids = np.stack([x, y, z], axis=-1).reshape(-1, 3)
     return BlockModel(centroids, np.broadcast_to(sides, centroids.shape).copy())
-
-
-def chunks(count: int, size: int) -> Iterator[slice]:
-    """Yield slices over ``count`` rows, ``size`` at a time."""
-    for start in range(0, count, size):
-        yield slice(start, min(start + size, count))

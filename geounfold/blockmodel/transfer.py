@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.blockmodel.model import BlockModel, chunks
+from geounfold.blockmodel.model import BlockModel
 from geounfold.errors import InputError, OptionError
 from geounfold.mesh import Bools, Floats
+from geounfold.threads import slices
 
 SPLIT = 4
 """Parts of a block along each axis: 64 in all, as block kriging takes."""
@@ -109,7 +110,7 @@ def transfer(
     parts = split**3
     out = np.full((len(target), given.shape[1]), np.nan)
     share = np.zeros_like(out)
-    for rows in chunks(len(target), max(_POINTS // parts, 1)):
+    for rows in slices(len(target), max(_POINTS // parts, 1)):
         there = carry(target.sub_points(split, rows).reshape(-1, 3))
         home = np.full(len(there), -1, dtype=np.int64)
         placed = np.isfinite(there).all(axis=1)

@@ -135,10 +135,10 @@ def _facts(names: list[str], result: Transfer) -> dict[str, Any]:
 
 def _held(saved: UnfoldingMap, blocks: BlockModel) -> Bools:
     """Return which blocks of the flat space have a part in the control mesh, (n,)."""
-    from geounfold.blockmodel.model import chunks
+    from geounfold.threads import slices
 
     held = np.zeros(len(blocks), dtype=bool)
-    for rows in chunks(len(blocks), 1 << 15):
+    for rows in slices(len(blocks), 1 << 15):
         parts = blocks.sub_points(2, rows)
         inside = saved.carry(parts.reshape(-1, 3), inverse=True).inside
         held[rows] = inside.reshape(parts.shape[:2]).any(axis=1)

@@ -72,6 +72,23 @@ class Carried:
         words = np.array([OUTSIDE, EXTRAPOLATED, INSIDE])
         return words[self.placed * (1 + self.inside.astype(np.int8))]
 
+    def spread(self, rows: Bools) -> Carried:
+        """Return these points as the True rows (m,) among others that have no image."""
+        if rows.all():
+            return self
+        out = Carried(
+            points=np.full((len(rows), 3), np.nan),
+            stratigraphic=np.full(len(rows), np.nan),
+            inside=np.zeros(len(rows), bool),
+            placed=np.zeros(len(rows), bool),
+            element=np.full(len(rows), -1, dtype=np.int64),
+            distance=np.full(len(rows), np.nan),
+            unsolved=self.unsolved,
+        )
+        for name in ("points", "stratigraphic", "inside", "placed", "element", "distance"):
+            getattr(out, name)[rows] = getattr(self, name)
+        return out
+
     def part(self, rows: slice) -> Carried:
         """Return what became of some of the points."""
         return Carried(
@@ -331,7 +348,7 @@ class UnfoldingMap:
         P = np.ascontiguousarray(points, dtype=np.float64)
         if inverse and P.ndim == 2 and np.isnan(P).any():
             there: Bools = np.logical_not(np.isnan(P).all(axis=1))
-            return _spread(self.carry(P[there], inverse=True), there)
+            return self.carry(P[there], inverse=True).spread(there)
         P = checked_points(P)
         n = len(P)
         space, image = (self._unfolded, self._fold) if inverse else (self._folded, self._unfold)
@@ -495,22 +512,6 @@ class UnfoldingMap:
             "shell": whole.folded.T[count:],
             "stratigraphic": whole.stratigraphic,
         }
-
-
-def _spread(carried: Carried, rows: Bools) -> Carried:
-    """Return points carried for some rows among others that have no image."""
-    n = len(rows)
-    points, stratigraphic, distance = (
-        np.full((n, 3), np.nan),
-        np.full(n, np.nan),
-        np.full(n, np.nan),
-    )
-    inside, placed = np.zeros(n, bool), np.zeros(n, bool)
-    element = np.full(n, -1, dtype=np.int64)
-    points[rows], stratigraphic[rows] = carried.points, carried.stratigraphic
-    inside[rows], placed[rows] = carried.inside, carried.placed
-    element[rows], distance[rows] = carried.element, carried.distance
-    return Carried(points, stratigraphic, inside, placed, element, distance, carried.unsolved)
 
 
 def checked_points(points: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -285,6 +285,38 @@ def turned_over(fit: BodyFit) -> BodyFit:
         flattenings={OTHER_SIDE.get(name, name): f for name, f in fit.flattenings.items()},
         notes=notes,
         rule=None if fit.rule is None else TurnedOver(fit.rule),
+    )
+
+
+def by_rule(
+    body: Body,
+    sheet: SheetResult,
+    rule: Pointwise,
+    folded: Mapping[str, TriMesh],
+    notes: dict[str, object],
+    warnings: tuple[str, ...] = (),
+) -> BodyFit:
+    """Return the fit of a method that has a rule for single points and no control mesh.
+
+    Parameters
+    ----------
+    body, sheet, rule, notes, warnings
+        As BodyFit has them.
+    folded : mapping of TriMesh
+        Surfaces by name, working units, which the rule lays flat.
+    """
+    return BodyFit(
+        hull=body.hull,
+        split=body.split,
+        control=None,
+        shell=None,
+        surfaces={name: carried_pair(mesh, rule) for name, mesh in folded.items()},
+        flattenings={},
+        sheet=sheet,
+        notes=notes,
+        rule=rule,
+        points=body.blocks,
+        warnings=warnings,
     )
 
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from geounfold.errors import FlatteningError, InputError, OptionError
 from geounfold.geometry import vertex_normals
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
-from geounfold.methods.contract import Body, BodyFit, Placed, carried_pair
+from geounfold.methods.contract import Body, BodyFit, Placed, by_rule
 from geounfold.methods.sheet import sheet_stages
 from geounfold.sheet import SheetResult
 from geounfold.sheet.build import register
@@ -98,20 +98,8 @@ def fit_isomap(body: Body) -> BodyFit:
         uv = _onto(uv, mid, mesh.layers.flat)
         placed = _placed(body.points, mid, uv, options)
         rule = NeighbourRule(np.concatenate([mid.V, body.points]), placed, options, sheet)
-        surfaces = {name: carried_pair(pair[0], rule) for name, pair in sheet.mesh.surfaces.items()}
-    notes: dict[str, object] = {"reference": len(mid.V), "landmarks": count}
-    return BodyFit(
-        body.hull,
-        body.split,
-        None,
-        None,
-        surfaces,
-        {},
-        sheet,
-        notes,
-        rule,
-        body.blocks,
-    )
+        folded = {name: pair[0] for name, pair in sheet.mesh.surfaces.items()}
+        return by_rule(body, sheet, rule, folded, {"reference": len(mid.V), "landmarks": count})
 
 
 def landmark_isomap(P: Floats, options: IsomapOptions) -> tuple[Floats, int]:

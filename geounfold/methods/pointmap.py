@@ -106,8 +106,8 @@ class PointwiseMap:
         out[~good] = np.nan
         share = np.where(good, share, np.nan)
         inside = good & anchored & (distance == 0)
-        return _spread(
-            Carried(out, share, inside, good, _none(P), distance * self.frame.scale), there
+        return Carried(out, share, inside, good, _none(P), distance * self.frame.scale).spread(
+            there
         )
 
     def returned(self, points: Floats, carried: Carried) -> Returned | None:
@@ -139,19 +139,3 @@ def no_mesh(method: str, what: str) -> str:
 
 def _none(P: Floats) -> np.ndarray:
     return np.full(len(P), -1, dtype=np.int64)
-
-
-def _spread(carried: Carried, rows: Bools) -> Carried:
-    """Return points carried for some rows among others that have no image."""
-    if rows.all():
-        return carried
-    n = len(rows)
-    points, share, distance = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
-    inside, placed = np.zeros(n, bool), np.zeros(n, bool)
-    points[rows], share[rows], distance[rows] = (
-        carried.points,
-        carried.stratigraphic,
-        carried.distance,
-    )
-    inside[rows], placed[rows] = carried.inside, carried.placed
-    return Carried(points, share, inside, placed, np.full(n, -1, dtype=np.int64), distance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geounfold.methods.contract import Body, BodyFit, carried_pair
+from geounfold.methods.contract import Body, BodyFit, by_rule
 from geounfold.methods.heights import vertical_rule, vertical_warnings
 from geounfold.methods.sheet import sheet_stages
 
@@ -29,18 +29,5 @@ def vertical_fit(body: Body, datum: str) -> BodyFit:
     with body.stage("heights"):
         rule, at = vertical_rule(body, sheet, datum)
         warnings, notes = vertical_warnings(at, len(body.blocks))
-        pairs = sheet.mesh.surfaces.items()
-        surfaces = {name: carried_pair(folded, rule) for name, (folded, _) in pairs}
-    return BodyFit(
-        body.hull,
-        body.split,
-        None,
-        None,
-        surfaces,
-        {},
-        sheet,
-        notes,
-        rule,
-        body.blocks,
-        warnings,
-    )
+        folded = {name: pair[0] for name, pair in sheet.mesh.surfaces.items()}
+        return by_rule(body, sheet, rule, folded, notes, warnings)

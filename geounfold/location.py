@@ -50,11 +50,11 @@ class TetWalk:
     def locate(self, x: Floats, y: Floats, z: Floats) -> tuple[Numbers, Floats]:
         """Return the tetrahedron of each point, (k,), -1 where the walk found none.
 
-        Also the barycentric coordinates of the second to fourth corner, (3, k), which are
-        meaningless where it found none.
+        Also the barycentric coordinates of the second to fourth corner, (3, k), 0 where
+        it found none.
         """
         element = self._grid.start(x, y, z)
-        weights = np.empty((3, len(x)))
+        weights = np.zeros((3, len(x)))
         found = np.full(len(x), -1, dtype=np.int32)
         rows = np.flatnonzero(element >= 0)
         every = len(rows) == len(x)

@@ -68,7 +68,7 @@ def by_distances(problem: Problem, chosen: Ints, D: Floats, method: str, kind: s
     FlatteningError
         The distances are those of a line.
     """
-    uv = upright(_scaled(D, chosen, method), problem.mesh.F)
+    uv = upright(scaled(D, chosen, method), problem.mesh.F)
     history = History.empty(problem)
     error = 0.0
     for k, row in zip(chosen, D, strict=True):
@@ -78,8 +78,14 @@ def by_distances(problem: Problem, chosen: Ints, D: Floats, method: str, kind: s
     return finish(problem, uv, method, Stop.DIRECT, 0, history, note)
 
 
-def _scaled(D: Floats, chosen: Ints, method: str) -> Floats:
-    """Return plane positions (n, 2) by the distances (k, n) from the landmarks."""
+def scaled(D: Floats, chosen: Ints, method: str) -> Floats:
+    """Return plane positions (n, 2) by the distances (k, n) from the landmarks.
+
+    Raises
+    ------
+    FlatteningError
+        The distances are those of a line; the message begins with the method's name.
+    """
     squared = D * D
     among = squared[:, chosen]
     among = (among + among.T) / 2  # the heat method's differ one way and back

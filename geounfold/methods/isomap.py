@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import eigh
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from geounfold.errors import FlatteningError, InputError, OptionError
+from geounfold.flattening._landmarks import scaled
 from geounfold.geometry import vertex_normals
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
 from geounfold.methods.contract import Body, BodyFit, Placed, by_rule
@@ -118,17 +118,8 @@ def landmark_isomap(P: Floats, options: IsomapOptions) -> tuple[Floats, int]:
             f"{options.neighbours}"
         )
     marks = _farthest(P, min(options.landmarks, len(P)))
-    far = np.asarray(dijkstra(graph, directed=False, indices=marks)) ** 2
-    among = far[:, marks]
-    mean = among.mean(axis=0)
-    gram = -0.5 * (among - mean - mean[:, None] + mean.mean())
-    n = len(marks)
-    value, vector = eigh((gram + gram.T) / 2, subset_by_index=(n - 2, n - 1))
-    value, vector = value[::-1], vector[:, ::-1]
-    if not value[1] > 0:
-        raise FlatteningError("isomap: the distances along the surface have no two dimensions")
-    # Each point by its distances to the landmarks; the landmarks come to their own places.
-    return -0.5 * (far - mean[:, None]).T @ (vector / np.sqrt(value)), n
+    far = np.asarray(dijkstra(graph, directed=False, indices=marks))
+    return scaled(far, marks, "isomap"), len(marks)
 
 
 def _graph(P: Floats, k: int) -> sp.csr_array:

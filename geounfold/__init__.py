@@ -17,6 +17,7 @@ from geounfold._version import __version__
 if TYPE_CHECKING:
     from geounfold.blockmodel import (
         BlockModel,
+        ModelFrame,
         axes_from_angles,
         block_model,
         regular_grid,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "BlockModel": "blockmodel",
+    "ModelFrame": "blockmodel",
     "axes_from_angles": "blockmodel",
     "block_model": "blockmodel",
     "regular_grid": "blockmodel",
@@ -94,6 +96,7 @@ __all__ = [
     "Flattening",
     "GeounfoldError",
     "InputError",
+    "ModelFrame",
     "Neighbourhood",
     "TetMesh",
     "TriMesh",

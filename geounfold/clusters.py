@@ -21,7 +21,8 @@ import pandas as pd
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.io.coordinates import LARGEST_COORDINATE, Triple, coordinate_columns, numbers
 from geounfold.io.parts import Part
-from geounfold.io.results import FOLDED, UNFOLDED, result_columns, with_carried
+from geounfold.io.points import Place
+from geounfold.io.results import FOLDED, UNFOLDED, result_columns, with_carried, world_columns
 from geounfold.io.tables import TextKind, table_writer, with_columns
 from geounfold.mapping import UnfoldingMap
 from geounfold.threads import cores
@@ -133,19 +134,23 @@ class Carrying:
         Leave out rows whose coordinates are missing or infinite instead of refusing them.
     ending : str
         Of the files written: .csv or .parquet.
+    place : callable or None
+        Takes the files' coordinates to the world's.
     """
 
     columns: Triple | None
     inverse: bool
     drop_invalid: bool
     ending: str
+    place: Place | None = None
 
     def where(self, part: Part) -> tuple[int, int, int]:
         """Return which of a part's columns are the coordinates."""
         columns = self.columns
         if columns is None and self.inverse and set(UNFOLDED) <= set(part.names):
             columns = UNFOLDED
-        where = coordinate_columns(part.names, columns, source=part.path)
+        own = self.place is not None
+        where = coordinate_columns(part.names, columns, source=part.path, own=own)
         names = FOLDED if self.inverse else UNFOLDED
         clash = [part.names[k] for k in where if part.names[k] in names]
         if clash:
@@ -214,6 +219,8 @@ def _carry_part(
     """Read, carry and write one part; whole or not at all, and the same each time."""
     frame = part.frame()
     points = np.column_stack([numbers(frame.iloc[:, k], source=part.path) for k in how.where(part)])
+    if how.place is not None:
+        points = how.place(points)
     valid = np.asarray(np.isfinite(points).all(axis=1))
     if not valid.all() and not how.drop_invalid:
         row = part.row + int(np.flatnonzero(~valid)[0]) + 1
@@ -227,6 +234,8 @@ def _carry_part(
         raise InputError(f"{part.path}: a coordinate is beyond {LARGEST_COORDINATE:g}")
     names = FOLDED if how.inverse else UNFOLDED
     results = result_columns(names, mapping.carry(points, inverse=how.inverse))
+    if how.place is not None:
+        results = world_columns(points) | results
     target = Path(out)
     fresh = target.with_name(f".{target.name}")
     with table_writer(fresh) as write:

@@ -17,6 +17,7 @@ import numpy as np
 
 from geounfold.cloud import scattered, scattered_spacing
 from geounfold.errors import OptionError
+from geounfold.geometry import turned
 from geounfold.lattice import (
     TOLERANCE,
     Lattice,
@@ -82,11 +83,11 @@ class Frame:
 
         A point's numbers are the same, bit for bit, whatever points come with it.
         """
-        return _turn(points - self.origin, self.rotation / self.scale)
+        return turned(points - self.origin, self.rotation / self.scale)
 
     def to_world(self, points: Floats) -> Floats:
         """Return working points (n, 3) in world coordinates."""
-        return np.stack(_turn(points, self.rotation.T * self.scale), axis=1) + self.origin
+        return np.stack(turned(points, self.rotation.T * self.scale), axis=1) + self.origin
 
     def snap(self, points_work: Floats) -> Floats:
         """Return working points (n, 3) moved onto the lattice, exactly ``k * steps``.
@@ -133,16 +134,6 @@ class Frame:
             raise OptionError(f"up must be three finite numbers, not all zero, but is {world_up}")
         out: Floats = self.rotation @ (up / length)
         return out
-
-
-def _turn(points: Floats, matrix: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return a matrix times each point (n, 3), by columns, (n,) each.
-
-    Not by the linear algebra library, whose rounding depends on a row's place among the others.
-    """
-    x, y, z = points.T
-    a, b, c = (x * row[0] + y * row[1] + z * row[2] for row in matrix)
-    return a, b, c
 
 
 def working_frame(points: Floats, lattice: Lattice | None, *, exact: bool = True) -> Frame:
@@ -204,13 +195,13 @@ def axis_angle_rotation(from_vec: Floats, to_vec: Floats) -> Floats:
     """
     a, b = _direction(from_vec), _direction(to_vec)
     if a @ b >= 0:
-        return _small_turn(a, b)
+        return _smallturned(a, b)
     axis = np.cross(a, b)
     if np.linalg.norm(axis) < 1e-12:
         axis = np.cross(a, np.eye(3)[(a * a).argmin()])
     axis = axis / np.linalg.norm(axis)
     half_turn = 2 * np.outer(axis, axis) - np.eye(3)
-    out: Floats = _small_turn(-a, b) @ half_turn
+    out: Floats = _smallturned(-a, b) @ half_turn
     return out
 
 
@@ -222,7 +213,7 @@ def _direction(vector: Floats) -> Floats:
     return out
 
 
-def _small_turn(a: Floats, b: Floats) -> Floats:
+def _smallturned(a: Floats, b: Floats) -> Floats:
     """Rodrigues' rotation of unit a to unit b, at most a right angle apart."""
     x, y, z = np.cross(a, b)
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -209,3 +209,13 @@ def loop_turning(V: Floats, F: Ints, loop: Ints) -> float:
     """
     at = np.bincount(F.ravel(), corner_angles(V, F).ravel(), len(V))
     return float((np.pi - at[loop]).sum())
+
+
+def turned(points: Floats, matrix: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return a matrix times each point (n, 3), by columns, (n,) each.
+
+    Not by the linear algebra library, whose rounding depends on a row's place among the others.
+    """
+    x, y, z = points.T
+    a, b, c = (x * row[0] + y * row[1] + z * row[2] for row in matrix)
+    return a, b, c

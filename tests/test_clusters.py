@@ -97,12 +97,16 @@ def test_files_on_a_given_cluster_come_out_as_without_one(fitted, tmp_path, monk
     frame[:half].to_parquet("in/a.parquet", index=False, row_group_size=500)
     frame[half:].to_parquet("in/b.parquet", index=False, row_group_size=700)
     frame.to_csv("in.csv", index=False)
+    own = gu.ModelFrame.turned((100.0, -50.0, 7.0), bearing=30.0).to_own(frame[["x", "y", "z"]])
+    frame.assign(x=own[:, 0], y=own[:, 1], z=own[:, 2]).to_csv("own.csv", index=False)
     expected = u.transform(frame)
     with _cluster() as cluster:
         common = ["--engine", "dask", "--scheduler", cluster.scheduler_address]
         assert main(["map", str(path), "in", "-o", "out.parquet", *common]) == 0
         assert main(["map", str(path), "in.csv", "-o", "out.csv", *common]) == 0
         assert main(["map", str(path), "in.csv", "-o", "typed.parquet", *common]) == 0
+        turned = ["--origin", "100,-50,7", "--rotation", "30,0,0"]
+        assert main(["map", str(path), "own.csv", "-o", "own.parquet", *turned, *common]) == 0
         words = ["map", str(path), "out.parquet", "-o", "back.parquet", "--inverse"]
         named = ["--columns", "unfolded_x,unfolded_y,unfolded_z"]
         assert main([*words, *named, *common]) == 0
@@ -117,6 +121,11 @@ def test_files_on_a_given_cluster_come_out_as_without_one(fitted, tmp_path, monk
         pd.testing.assert_frame_equal(
             read(Path(name)), expected, check_exact=True, check_dtype=False
         )
+    placed = read(Path("own.parquet"))
+    for names in (["unfolded_x", "unfolded_y", "unfolded_z"], ["world_x", "world_y", "world_z"]):
+        given = expected[[n.replace("world_", "") for n in names]]
+        # Turned there and back, in coordinates of some 1e6 m.
+        np.testing.assert_allclose(placed[names], given, rtol=0, atol=1e-6)
     back = read(Path("back.parquet"))[["folded_x", "folded_y", "folded_z"]].to_numpy()
     assert np.abs(back - u.to_folded(u.to_flat(frame[["x", "y", "z"]].to_numpy()))).max() == 0
     assert not [p.name for p in tmp_path.iterdir() if p.name.startswith(".")]

@@ -12,11 +12,13 @@ import numpy as np
 import pandas as pd
 
 from geounfold.cli.console import Console
+from geounfold.cli.frames import model_axes, model_frame, three_numbers
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, read_points, write_json
 from geounfold.io.coordinates import Triple, parse_columns
 from geounfold.io.formats import point_endings
-from geounfold.io.results import UNFOLDED
+from geounfold.io.points import Place
+from geounfold.io.results import UNFOLDED, world_columns
 from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
 
 if TYPE_CHECKING:
@@ -31,7 +33,7 @@ _SPACES = ("folded", "unfolded")
 
 def grid(args: Namespace, console: Console) -> None:
     """Write a regular grid of blocks that covers unfolded points."""
-    sides = _numbers(args.sizes, "--sizes")
+    sides = three_numbers(args.sizes, "--sizes")
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)},
         [args.points, *([] if args.map is None else [args.map])],
@@ -80,12 +82,15 @@ def transfer(args: Namespace, console: Console) -> None:
     existing_file(Path(args.map))
     back = args.to == "folded"
     flat: tuple[Triple, ...] = (UNFOLDED,)
-    source = _read(args.source, args.source_columns, args, console, flat if back else ())
-    target = _read(args.target, args.target_columns, args, console, () if back else flat)
+    frame = None if args.origin is None else model_frame(args)
+    place = None if frame is None else frame.to_world
+    here, there = (flat, None), ((), place)
+    source = _read(args.source, args.source_columns, args, console, *(here if back else there))
+    target = _read(args.target, args.target_columns, args, console, *(there if back else here))
     names = _value_columns(args.values, source)
     target.check_writable(args.output)
     values = np.column_stack([source.numbers(name) for name in names])
-    axes = _axes(args.rotation)
+    axes = model_axes(args.rotation) if frame is None else frame.axes
     from geounfold import mapping
     from geounfold.blockmodel import transfer as moved
 
@@ -99,6 +104,8 @@ def transfer(args: Namespace, console: Console) -> None:
     columns: dict[str, Any] = {}
     for k, name in enumerate(names):
         columns |= {name: result.means[:, k], f"{name}_share": result.share[:, k]}
+    if back and frame is not None:
+        columns |= world_columns(target.points)
     facts = _facts(names, result)
     with outputs.writing() as parts:
         target.write(parts["--output"], columns)
@@ -151,6 +158,7 @@ def _read(
     args: Namespace,
     console: Console,
     prefer: tuple[Triple, ...],
+    place: Place | None = None,
     *,
     gaps: bool = False,
 ) -> PointTable:
@@ -158,7 +166,7 @@ def _read(
     console.stage(f"reading {path}")
     names = None if columns is None else parse_columns(columns)
     drop = gaps or args.drop_invalid
-    table = read_points(path, names, prefer=prefer, drop_invalid=drop)
+    table = read_points(path, names, prefer=prefer, drop_invalid=drop, place=place)
     if len(table.dropped):
         console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
     return table
@@ -257,20 +265,6 @@ class BlockVolumes:
         if not self._without:
             return []
         return [f"{self._without} blocks have no positive sides, and so no volume"]
-
-
-def _axes(text: str | None) -> Floats | None:
-    from geounfold.blockmodel import axes_from_angles
-
-    return None if text is None else axes_from_angles(*_numbers(text, "--rotation"))
-
-
-def _numbers(text: str, option: str) -> tuple[float, float, float]:
-    try:
-        a, b, c = (float(word) for word in text.split(","))
-    except ValueError as error:
-        raise OptionError(f"{option} needs three numbers such as 10,10,5, not '{text}'") from error
-    return a, b, c
 
 
 def _whole(text: str, option: str) -> int:

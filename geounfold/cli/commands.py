@@ -15,6 +15,7 @@ import numpy as np
 from geounfold.cli.blocks import BlockVolumes
 from geounfold.cli.console import Console
 from geounfold.cli.exploring import check_grade_options, exploration, graded_samples
+from geounfold.cli.frames import model_frame
 from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
 from geounfold.cli.table import table_text
 from geounfold.errors import InputError, OptionError, OutputError
@@ -29,13 +30,14 @@ from geounfold.io import (
 )
 from geounfold.io.coordinates import Triple, parse_columns
 from geounfold.io.formats import point_endings, surface_endings
-from geounfold.io.results import FOLDED, UNFOLDED, result_columns
+from geounfold.io.results import FOLDED, UNFOLDED, result_columns, world_columns
 from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables import TABLE_ENDINGS, ending, existing_file, write_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from geounfold.blockmodel import ModelFrame
     from geounfold.io.streams import PointStream
     from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Bools, Floats, TriMesh
@@ -84,7 +86,8 @@ def unfold(args: Namespace, console: Console) -> None:
         _check_pictures(console)
     options = _options(args)
     _check_mesh_outputs(args, options)
-    table = _open(args, console, args.output, whole=args.report is not None)
+    frame = model_frame(args)
+    table = _open(args, console, args.output, frame=frame, whole=args.report is not None)
     table.check_writable(args.output)
     names = table.frame.columns if isinstance(table, PointTable) else table.rows.names
     volumes = BlockVolumes(args.sizes, [str(name) for name in names], args.points)
@@ -98,7 +101,8 @@ def unfold(args: Namespace, console: Console) -> None:
     from geounfold import pipeline
 
     result = pipeline.unfold(table.points, options, progress=console.stage, **surfaces)
-    summary = {**result.summary(), "input": table.facts(), "command": _command(args)}
+    read = table.facts() if frame is None else {**table.facts(), **frame.facts()}
+    summary = {**result.summary(), "input": read, "command": _command(args)}
     if args.crosscheck:
         from geounfold.verification import crosscheck as check_meshes
 
@@ -121,7 +125,11 @@ def unfold(args: Namespace, console: Console) -> None:
     console.stage("writing")
     with outputs.writing() as parts:
         table.write_parts(
-            parts["--output"], lambda frame, _, rows: _results(result, rows, frame, volumes)
+            parts["--output"],
+            lambda own, points, rows: {
+                **({} if frame is None else world_columns(points)),
+                **_results(result, rows, own, volumes),
+            },
         )
         summary.update(volumes.facts())
         summary["warnings"] = [*summary.get("warnings", []), *volumes.warnings()]
@@ -192,8 +200,11 @@ def carry(args: Namespace, console: Console) -> None:
         )
     if args.holes is None and args.samples_out is not None:
         raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    frame = model_frame(args)
+    if frame is not None and (args.points is None or args.inverse):
+        raise OptionError("--origin is that of POINTS in the folded space: without --inverse")
     if args.engine == "dask":
-        _carry_on_cluster(args, console)
+        _carry_on_cluster(args, frame, console)
         return
     if args.scheduler is not None:
         raise OptionError("--scheduler needs --engine dask")
@@ -211,10 +222,14 @@ def carry(args: Namespace, console: Console) -> None:
     )
     existing_file(Path(args.map))
     if args.points is not None and _is_wireframe(args):
-        _carry_surface(args, console, outputs)
+        _carry_surface(args, frame, console, outputs)
         return
     prefer = (UNFOLDED,) if args.inverse else ()
-    table = None if args.points is None else _open(args, console, args.output, prefer, keep=False)
+    table = (
+        None
+        if args.points is None
+        else _open(args, console, args.output, prefer, frame=frame, keep=False)
+    )
     holes = read_holes(args, console)
     from geounfold import mapping
 
@@ -229,7 +244,7 @@ def carry(args: Namespace, console: Console) -> None:
         found = result_columns(names, there)
         places.update(_places(found))
         unsolved.append(there.unsolved if args.inverse else 0)
-        return found
+        return found if frame is None else {**world_columns(points), **found}
 
     traced = {} if holes is None else holes.carried(_flat(saved))
     with outputs.writing() as parts:
@@ -254,7 +269,7 @@ def carry(args: Namespace, console: Console) -> None:
     console.answer(named)
 
 
-def _carry_on_cluster(args: Namespace, console: Console) -> None:
+def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Console) -> None:
     """Carry a table in parts by a Dask cluster, into a folder of parts."""
     if args.points is None or args.holes is not None:
         raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
@@ -271,7 +286,8 @@ def _carry_on_cluster(args: Namespace, console: Console) -> None:
     existing_file(Path(args.map))
     if Path(args.output).resolve() == Path(args.points).resolve():
         raise OutputError(f"{args.output}: --output is also an input; choose another folder")
-    how = Carrying(_triple(args.columns), args.inverse, args.drop_invalid, kind)
+    place = None if frame is None else frame.to_world
+    how = Carrying(_triple(args.columns), args.inverse, args.drop_invalid, kind, place)
     with whole_folder(args.output, overwrite=args.overwrite, watcher=console.journal) as folder:
         saved = mapping.load(args.map)
         console.stage(f"looking through {args.points}")
@@ -294,7 +310,9 @@ def _is_wireframe(args: Namespace) -> bool:
     return kind not in _POINTS_OUT or holds_surface(args.points)
 
 
-def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
+def _carry_surface(
+    args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
+) -> None:
     """Carry a wireframe's vertices and write the same triangles between them."""
     console.stage(f"reading {args.points}")
     mesh, meta = read_surface_with_meta(args.points)
@@ -302,7 +320,8 @@ def _carry_surface(args: Namespace, console: Console, outputs: Outputs) -> None:
 
     saved = mapping.load(args.map)
     console.stage("carrying vertices")
-    carried = saved.carry(mesh.V, inverse=args.inverse)
+    vertices = mesh.V if frame is None else frame.to_world(mesh.V)
+    carried = saved.carry(vertices, inverse=args.inverse)
     lost = int(np.count_nonzero(~np.isfinite(carried.points).all(axis=1)))
     if lost:
         raise InputError(
@@ -664,12 +683,17 @@ def _triple(text: str | None) -> Triple | None:
 
 
 def _read(
-    path: str, args: Namespace, console: Console, prefer: tuple[Triple, ...] = ()
+    path: str,
+    args: Namespace,
+    console: Console,
+    prefer: tuple[Triple, ...] = (),
+    frame: ModelFrame | None = None,
 ) -> PointTable:
     """Read the points of a command, and say what was left out."""
     console.stage(f"reading {path}")
     columns = _triple(args.columns)
-    table = read_points(path, columns, prefer=prefer, drop_invalid=args.drop_invalid)
+    place = None if frame is None else frame.to_world
+    table = read_points(path, columns, prefer=prefer, drop_invalid=args.drop_invalid, place=place)
     _say_dropped(table, path, console)
     return table
 
@@ -680,18 +704,24 @@ def _open(
     out: str,
     prefer: tuple[Triple, ...] = (),
     *,
+    frame: ModelFrame | None = None,
     keep: bool = True,
     whole: bool = False,
 ) -> PointTable | PointStream:
     """Read the points of a command, in batches where both files are tables, unless wanted whole."""
     if whole or ending(Path(out)) not in TABLE_ENDINGS:
-        return _read(args.points, args, console, prefer)
+        return _read(args.points, args, console, prefer, frame)
     from geounfold.io.streams import open_points
 
     console.stage(f"reading {args.points}")
     columns = _triple(args.columns)
     table = open_points(
-        args.points, columns, prefer=prefer, drop_invalid=args.drop_invalid, keep=keep
+        args.points,
+        columns,
+        prefer=prefer,
+        drop_invalid=args.drop_invalid,
+        place=None if frame is None else frame.to_world,
+        keep=keep,
     )
     _say_dropped(table, args.points, console)
     return table

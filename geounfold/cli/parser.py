@@ -31,6 +31,11 @@ results:
   location           inside the control mesh, extrapolated around it, or outside: left empty
   mesh_distance      distance from the control mesh, 0 inside it
 """
+_ANGLES = """\
+Of turned models, bearing is the compass direction of the model's own y axis (0: not turned), plunge
+its inclination below the horizontal, and dip how far the x axis turns downwards about it, all in
+degrees. With --origin, results have world_x, world_y, world_z too, which are found first wherever
+points are read."""
 _UNFOLD = (
     _RESULTS
     + """\
@@ -38,7 +43,10 @@ _UNFOLD = (
   block_volume, unfolded_volume   where the blocks' sides are known (see --sizes)
 
 Every input column and row comes back in order. An input column called as a result is replaced
-in its place. Output tables are separated by commas, whatever the input's separator."""
+in its place. Output tables are separated by commas, whatever the input's separator.
+
+"""
+    + _ANGLES
 )
 _MAP = (
     _RESULTS
@@ -48,7 +56,10 @@ with --inverse (columns unfolded_x/y/z are taken first where they exist):
   location, mesh_distance               as above, in the unfolded space
 
 Every input column and row comes back in order. An input column called as a result is replaced
-in its place."""
+in its place.
+
+"""
+    + _ANGLES
 )
 _HOLES = """
 
@@ -60,14 +71,17 @@ drill-holes: --samples-out has hole, from, to, x, y, z of each interval's midpoi
 _GRID = """\
 The grid's blocks lie along the axes of the unfolded space, with faces at whole multiples of their
 sides: columns x, y, z, dx, dy, dz, and i, j, k from 0."""
-_TRANSFER = """\
+_TRANSFER = (
+    """\
 Each target block is cut into equal parts; the source block at the image of a part's centre gives
 its value, and the mean over the parts is written, with NAME_share, the share of the parts that have
 one. The summary has the sums of volume times value on both sides.
 
-Sides are columns (XINC, dx, size_x and alike are found) or the steps of the centroids' lattice. Of
-turned models, bearing is the compass direction of the model's own y axis (0: not turned), plunge
-its inclination below the horizontal, and dip how far the x axis turns downwards about it."""
+Sides are columns (XINC, dx, size_x and alike are found) or the steps of the centroids' lattice.
+
+"""
+    + _ANGLES
+)
 _ESTIMATE = """\
 results, by the grade's column, say CU:
   CU_estimate        at the block's centroid, as a point; empty where there is none
@@ -324,6 +338,21 @@ def _add_model(parser: argparse.ArgumentParser, title: str = "method") -> Any:
     return group
 
 
+def _add_frame(parser: argparse.ArgumentParser, whose: str, rotation: str = "") -> None:
+    """Add the options of a block model in coordinates of its own."""
+    parser.add_argument(
+        "--origin",
+        metavar="X,Y,Z",
+        help=f"{whose} are in the model's own coordinates; their origin in the world",
+    )
+    parser.add_argument(
+        "--rotation",
+        metavar="BEARING,PLUNGE,DIP",
+        help=rotation
+        or "with --origin: how the model's own axes are turned (default 0,0,0; see below)",
+    )
+
+
 def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = _add_command(commands, "unfold", "unfold a body", common, _UNFOLD + _HOLES + _FORMATS)
     parser.add_argument("points", metavar="POINTS", help=f"block centroids: {_POINTS}")
@@ -340,6 +369,7 @@ def _add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
         help="sides of the blocks, for their volumes: three columns (XINC, dx and alike are "
         "found) or lengths",
     )
+    _add_frame(parser, "POINTS")
     parser.add_argument("--samples", metavar="P", help=f"other points to carry: {_POINTS}")
     parser.add_argument("--samples-out", metavar="Q", help="where they, or the holes' samples, go")
     parser.add_argument(
@@ -438,6 +468,7 @@ def _add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> 
         metavar="ADDRESS",
         help="of a running Dask cluster, such as tcp://host:8786; without, this machine's cores",
     )
+    _add_frame(parser, "POINTS")
     _add_columns(parser)
     _add_holes(parser).add_argument("--samples-out", metavar="Q", help="where samples go")
 
@@ -614,10 +645,10 @@ def _add_transfer(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--split", metavar="N", default="4", help="parts of a block along each axis (default 4)"
     )
-    parser.add_argument(
-        "--rotation",
-        metavar="BEARING,PLUNGE,DIP",
-        help="how the folded blocks are turned, in degrees (default: measured; see below)",
+    _add_frame(
+        parser,
+        "the folded blocks",
+        "how the folded blocks are turned, in degrees (default: measured; see below)",
     )
     for side in ("source", "target"):
         name = side.upper()

@@ -36,6 +36,7 @@ _PATTERNS = (
     "{}world",
     "world{}",
 )
+_WORLD = (("xworld", "yworld", "zworld"), ("worldx", "worldy", "worldz"))
 _NAMED = (("easting", "northing", "elevation"), ("east", "north", "elevation"))
 _FAMILIES: tuple[Triple, ...] = (
     *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
@@ -77,7 +78,11 @@ def parse_columns(text: str) -> Triple:
 
 
 def coordinate_columns(
-    names: Sequence[str], columns: Triple | None = None, *, source: str = "the table"
+    names: Sequence[str],
+    columns: Triple | None = None,
+    *,
+    source: str = "the table",
+    own: bool = False,
 ) -> tuple[int, int, int]:
     """Return the positions of the three coordinate columns.
 
@@ -87,9 +92,11 @@ def coordinate_columns(
         The table's column names.
     columns : three str, optional
         Their names. Without them: centroid_x/y/z, x/y/z, XC/YC/ZC, xcentre/ycentre/zcentre,
-        easting/northing/elevation and the like, in any letter case.
+        easting/northing/elevation and the like, in any letter case; world_x/y/z before any other.
     source : str, optional
         Begins the messages: the file's name.
+    own : bool, optional
+        A block model's own coordinates are wanted: world_x/y/z are passed over.
 
     Raises
     ------
@@ -109,6 +116,11 @@ def coordinate_columns(
     plain = [plain_name(name) for name in names]
     for tier in (_FAMILIES, _MIXED):
         found = [family for family in tier if set(family) <= set(plain)]
+        in_world = [family for family in found if family in _WORLD]
+        if own:
+            found = [family for family in found if family not in _WORLD]
+        elif in_world:
+            found = in_world
         if found:
             return _only(found, names, plain, source)
     if _all_numbers(names):

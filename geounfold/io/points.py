@@ -17,6 +17,9 @@ from geounfold.io.coordinates import LARGEST_COORDINATE, Triple, coordinate_colu
 from geounfold.io.tables import check_writable, read_table, with_columns, write_table
 from geounfold.mesh import Bools, Floats, Ints
 
+Place = Callable[[Floats], Floats]
+"""Takes points (n, 3) from a model's own coordinates to the world's."""
+
 
 @dataclass(frozen=True, eq=False)
 class PointTable:
@@ -31,7 +34,7 @@ class PointTable:
     columns : three str
         Names of the coordinate columns.
     points : (n, 3) float
-        The coordinates, in the file's unit; finite.
+        World coordinates, in the file's unit; finite.
     dropped : (k,) int
         The data rows left out for want of finite coordinates (1 is the first after the header).
     text : bool
@@ -125,6 +128,7 @@ def read_points(
     *,
     prefer: tuple[Triple, ...] = (),
     drop_invalid: bool = False,
+    place: Place | None = None,
 ) -> PointTable:
     """Return the points of a file: a table, or any format of `geounfold.io.formats`.
 
@@ -138,6 +142,8 @@ def read_points(
         Names to take first where a table has all three, as ``unfolded_x`` ... of an output.
     drop_invalid : bool, optional
         Leave out rows whose coordinates are missing or infinite instead of refusing them.
+    place : callable, optional
+        Takes a model's own coordinates, which the file then holds, to the world's.
 
     Raises
     ------
@@ -150,9 +156,11 @@ def read_points(
     names = [str(name) for name in table.frame.columns]
     if columns is None:
         columns = next((p for p in prefer if set(p) <= set(names)), table.columns)
-    where = coordinate_columns(names, columns, source=source)
+    where = coordinate_columns(names, columns, source=source, own=place is not None)
     axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
     points = np.column_stack(axes)
+    if place is not None:
+        points = place(points)
     valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
     _check_size(points, valid, source)
     dropped = np.flatnonzero(~valid) + 1

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
 FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
+WORLD: Triple = ("world_x", "world_y", "world_z")
 
 
 def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
@@ -31,6 +32,11 @@ def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
         "location": carried.location,
         "mesh_distance": carried.distance,
     }
+
+
+def world_columns(points: Floats) -> dict[str, Any]:
+    """Return the world coordinates of points (n, 3) read in a model's own, by output column."""
+    return {name: points[:, axis] for axis, name in enumerate(WORLD)}
 
 
 def frame_points(frame: pd.DataFrame, prefer: Triple | None = None) -> Floats:

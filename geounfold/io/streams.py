@@ -24,7 +24,7 @@ from geounfold.bodies import count_duplicates
 from geounfold.errors import InputError
 from geounfold.io import tables
 from geounfold.io.coordinates import LARGEST_COORDINATE, Triple, coordinate_columns, numbers
-from geounfold.io.points import PointTable, read_points
+from geounfold.io.points import Place, PointTable, read_points
 from geounfold.mesh import Bools, Floats, Ints
 
 BATCH = 1 << 17
@@ -145,6 +145,8 @@ class PointStream:
         How many points there are.
     dropped : (k,) int
         The data rows left out for want of finite coordinates, counted from 1.
+    place : callable or None
+        Takes the file's coordinates to the world's.
     meta : dict of str
         Empty: these files tell neither unit nor coordinate reference.
     """
@@ -155,6 +157,7 @@ class PointStream:
     kept: Floats | None
     count: int
     dropped: Ints
+    place: Place | None = None
     meta: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -229,7 +232,7 @@ class PointStream:
                 there[left_out] = False
                 frame = frame.loc[there].reset_index(drop=True)
             rows = slice(start, start + len(frame))
-            points = _coordinates(frame, where, self.source)
+            points = _coordinates(frame, where, self.source, self.place)
             start = rows.stop
             if not len(frame):
                 continue
@@ -249,8 +252,11 @@ class PointStream:
         return kinds
 
 
-def _coordinates(frame: pd.DataFrame, where: tuple[int, ...], source: str) -> Floats:
-    return np.column_stack([numbers(frame.iloc[:, i], source=source) for i in where])
+def _coordinates(
+    frame: pd.DataFrame, where: tuple[int, ...], source: str, place: Place | None
+) -> Floats:
+    points = np.column_stack([numbers(frame.iloc[:, i], source=source) for i in where])
+    return points if place is None else place(points)
 
 
 def open_points(
@@ -259,23 +265,24 @@ def open_points(
     *,
     prefer: tuple[Triple, ...] = (),
     drop_invalid: bool = False,
+    place: Place | None = None,
     keep: bool = True,
 ) -> PointTable | PointStream:
     """Return the points of a file, in batches where it is large and a table.
 
     Parameters
     ----------
-    path, columns, prefer, drop_invalid
+    path, columns, prefer, drop_invalid, place
         As for `read_points`, errors too.
     keep : bool
         Whether the coordinates of a large file are kept.
     """
     source = _large(Path(path))
     if source is not None:
-        found = _opened(str(path), source, columns, prefer, drop_invalid, keep)
+        found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep)
         if found is not None:
             return found
-    return read_points(path, columns, prefer=prefer, drop_invalid=drop_invalid)
+    return read_points(path, columns, prefer=prefer, drop_invalid=drop_invalid, place=place)
 
 
 def _large(path: Path) -> Source | None:
@@ -299,6 +306,7 @@ def _opened(
     columns: Triple | None,
     prefer: tuple[Triple, ...],
     drop_invalid: bool,
+    place: Place | None,
     keep: bool,
 ) -> PointStream | None:
     """Return the points of a source; None where something is wrong, which `read_points` says."""
@@ -310,9 +318,9 @@ def _opened(
     dropped = [np.empty(0, np.int64)]
     row = 0
     try:
-        where = coordinate_columns(source.names, columns, source=path)
+        where = coordinate_columns(source.names, columns, source=path, own=place is not None)
         for frame in source.batches(where):
-            points = _coordinates(frame, (0, 1, 2), path)
+            points = _coordinates(frame, (0, 1, 2), path, place)
             valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
             if (np.abs(points[valid]) > LARGEST_COORDINATE).any():
                 return None
@@ -329,4 +337,4 @@ def _opened(
         return None
     a, b, c = (source.names[i] for i in where)
     whole = np.concatenate(kept) if keep else None
-    return PointStream(path, source, (a, b, c), whole, row - len(left_out), left_out)
+    return PointStream(path, source, (a, b, c), whole, row - len(left_out), left_out, place)

@@ -551,7 +551,7 @@ def test_signals_clear_what_was_begun(
         "        parts['o'].write_text('half')\n"
         "        print('begun', flush=True)\n"
         "        time.sleep(30)\n"
-        "entry._handlers = lambda: {'simulate': slow}\n"
+        "entry._command = lambda name: slow\n"
         "sys.exit(entry.main(['simulate', '--list']))\n"
     )
     process = subprocess.Popen(

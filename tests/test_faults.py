@@ -34,7 +34,7 @@ LINES = {
 MEMORY = "geounfold: error: out of memory; nothing was written\n"
 UNFOLD = ("unfold", "p.csv", "-o", "out.csv", "--summary", "s.json", "--map", "m.npz")
 SAMPLES = ("--samples", "p.csv", "--samples-out", "q.csv")
-# Stages as pipeline.py, fitting.py, comparison.py and commands.py name them.
+# Stages as pipeline.py, fitting.py, comparison.py and cli/commands name them.
 SHEET = ("reading", "frame", "hull", "split", "sheet", "map", "quality", "writing")
 THESIS = ("reading", "frame", "hull", "split", "thesis", "map", "quality", "writing")
 
@@ -256,7 +256,7 @@ def endless(args, console):
         parts['o'].write_text('half')
         console.stage('endless')
         END
-entry._handlers = lambda: {'simulate': endless}
+entry._command = lambda name: endless
 sys.argv = ['geounfold', 'simulate', '--list']
 sys.exit(entry.main())
 """

@@ -224,8 +224,8 @@ def test_an_interrupted_batch_leaves_nothing(tmp_path, monkeypatch):
             raise InputError("the third batch")
         return {"flat": np.zeros(100)}
 
-    monkeypatch.setattr("geounfold.cli.commands.result_columns", lambda *a: failing(None))
-    monkeypatch.setattr("geounfold.cli.commands._places", lambda *a: {"carried": 1})
+    monkeypatch.setattr("geounfold.cli.commands.map.result_columns", lambda *a: failing(None))
+    monkeypatch.setattr("geounfold.cli.commands.map.place_counts", lambda *a: {"carried": 1})
     before = sorted(p.name for p in tmp_path.iterdir())
     assert main(["map", str(tmp_path / "m.npz"), str(path), "-o", str(tmp_path / "o.csv")]) == 2
     assert sorted(p.name for p in tmp_path.iterdir()) == before

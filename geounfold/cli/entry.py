@@ -8,8 +8,10 @@ import os
 import re
 import sys
 import traceback
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 
 from geounfold.cli.console import Console
 from geounfold.cli.journal import Journal
@@ -25,21 +27,21 @@ _NO_MEMORY = re.compile(
 )
 
 _COMMANDS = {
-    "unfold": "unfold",
-    "map": "carry",
-    "estimate": "estimate",
-    "compare": "compare",
-    "crosscheck": "crosscheck",
-    "quality": "quality",
-    "simulate": "simulate",
-    "view": "view",
+    "unfold": "unfold.unfold",
+    "map": "map.carry",
+    "estimate": "estimate.estimate",
+    "compare": "compare.compare",
+    "crosscheck": "crosscheck.crosscheck",
+    "quality": "quality.quality",
+    "simulate": "simulate.simulate",
+    "view": "view.view",
     "grid": "blocks.grid",
     "transfer": "blocks.transfer",
-    "init": "init",
-    "doctor": "doctor",
-    "completion": "completion",
+    "init": "assistance.init",
+    "doctor": "assistance.doctor",
+    "completion": "assistance.completion",
 }
-"""The commands, and their functions in `commands` or another module."""
+"""The commands, and their functions in `geounfold.cli.commands`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -134,18 +136,17 @@ def _run(words: Sequence[str], console: Console) -> None:
     if args.command is None:
         from geounfold.errors import OptionError
 
-        raise OptionError(f"a command is needed: {', '.join(_handlers())} (see 'geounfold --help')")
+        raise OptionError(f"a command is needed: {', '.join(_COMMANDS)} (see 'geounfold --help')")
     with _logging(args.verbose):
-        handlers = _handlers()
-        handlers[args.handler](args, console)
+        _command(args.handler)(args, console)
 
 
-def _handlers() -> dict[str, Callable[..., None]]:
-    from geounfold.cli import blocks, commands
-
-    modules = {"": commands, "blocks": blocks}
-    places = {name: function.rpartition(".") for name, function in _COMMANDS.items()}
-    return {name: getattr(modules[home], function) for name, (home, _, function) in places.items()}
+def _command(name: str) -> Callable[[Namespace, Console], None]:
+    """Return a command's function; its module alone is loaded."""
+    home, _, function = _COMMANDS[name].partition(".")
+    module = import_module(f"geounfold.cli.commands.{home}")
+    found: Callable[[Namespace, Console], None] = getattr(module, function)
+    return found
 
 
 @contextmanager

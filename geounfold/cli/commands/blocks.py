@@ -1,22 +1,23 @@
-"""The commands for block models: a grid over unfolded blocks, values moved between the spaces."""
+"""`geounfold grid` and `transfer`: a grid of blocks, values moved between the spaces."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from geounfold.cli.choices import whole_number
 from geounfold.cli.console import Console
+from geounfold.cli.endings import JSON, POINTS_OUT
 from geounfold.cli.frames import model_axes, model_frame, three_numbers
+from geounfold.cli.sides import columns_or_lengths
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, read_points, write_json
 from geounfold.io.coordinates import Triple, parse_columns
-from geounfold.io.formats import point_endings
 from geounfold.io.points import Place
 from geounfold.io.results import UNFOLDED, world_columns
 from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from geounfold.mapping import UnfoldingMap
     from geounfold.mesh import Bools, Floats
 
-_POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
-_JSON = (".json",)
 _SPACES = ("folded", "unfolded")
 
 
@@ -42,7 +41,9 @@ def grid(args: Namespace, console: Console) -> None:
     )
     if args.map is not None:
         existing_file(Path(args.map))
-    table = _read(args.points, args.columns, args, console, (UNFOLDED,), gaps=True)
+    table = _read_blocks(
+        args.points, args.columns, (UNFOLDED,), args=args, console=console, gaps=True
+    )
     from geounfold import mapping
     from geounfold.blockmodel import regular_grid
 
@@ -72,9 +73,9 @@ def transfer(args: Namespace, console: Console) -> None:
     """Move values between blocks of the two spaces, weighted by volume."""
     if args.to not in _SPACES:
         raise OptionError(f"--to must be folded or unfolded, not '{args.to}'")
-    split = _whole(args.split, "--split")
+    split = whole_number(args.split, "--split")
     outputs = Outputs.planned(
-        {"--output": (args.output, _POINTS_OUT), "--summary": (args.summary, _JSON)},
+        {"--output": (args.output, POINTS_OUT), "--summary": (args.summary, JSON)},
         [args.map, args.source, args.target],
         overwrite=args.overwrite,
         watcher=console.journal,
@@ -85,8 +86,9 @@ def transfer(args: Namespace, console: Console) -> None:
     frame = None if args.origin is None else model_frame(args)
     place = None if frame is None else frame.to_world
     here, there = (flat, None), ((), place)
-    source = _read(args.source, args.source_columns, args, console, *(here if back else there))
-    target = _read(args.target, args.target_columns, args, console, *(there if back else here))
+    read = partial(_read_blocks, args=args, console=console)
+    source = read(args.source, args.source_columns, *(here if back else there))
+    target = read(args.target, args.target_columns, *(there if back else here))
     names = _value_columns(args.values, source)
     target.check_writable(args.output)
     values = np.column_stack([source.numbers(name) for name in names])
@@ -152,14 +154,14 @@ def _held(saved: UnfoldingMap, blocks: BlockModel) -> Bools:
     return held
 
 
-def _read(
+def _read_blocks(
     path: str,
     columns: str | None,
-    args: Namespace,
-    console: Console,
     prefer: tuple[Triple, ...],
     place: Place | None = None,
     *,
+    args: Namespace,
+    console: Console,
     gaps: bool = False,
 ) -> PointTable:
     """Read points; with `gaps`, rows without coordinates (no image) are passed over."""
@@ -186,88 +188,5 @@ def _blocks(table: PointTable, sizes: str | None, axes: Floats | None) -> BlockM
     """Return a table's blocks; `sizes` are three columns or three lengths."""
     from geounfold.blockmodel import block_model
 
-    given = None if sizes is None else _columns_or_lengths(sizes)
+    given = None if sizes is None else columns_or_lengths(sizes)
     return block_model(table.frame, table.points, given, axes, source=table.source)
-
-
-def _columns_or_lengths(text: str) -> Triple | tuple[float, float, float]:
-    try:
-        a, b, c = (float(word) for word in text.split(","))
-    except ValueError:
-        return parse_columns(text)
-    return a, b, c
-
-
-class BlockVolumes:
-    """The columns of a block model's volumes, folded and unfolded, and their sums.
-
-    Parameters
-    ----------
-    sizes : str or None
-        Three columns or lengths as the user gave them; without, columns are found by name.
-    names : sequence of str
-        The table's columns.
-    source : str
-        The table, for messages.
-
-    Raises
-    ------
-    InputError
-        Columns that are not there.
-    OptionError
-        Lengths that are not positive.
-    """
-
-    def __init__(self, sizes: str | None, names: Sequence[str], source: str) -> None:
-        from geounfold.blockmodel.sizes import Sides, size_columns
-
-        self._sides: Sides | None = None
-        self._folded = self._unfolded = 0.0
-        self._without = 0
-        if sizes is None:
-            with suppress(InputError):  # several sets of columns: none is taken unasked
-                found = size_columns(names)
-                self._sides = None if found is None else Sides(found)
-            return
-        given = _columns_or_lengths(sizes)
-        for value in given:
-            if isinstance(value, str) and value not in names:
-                raise InputError(f"{source}: no column '{value}' for --sizes")
-            if not isinstance(value, str) and not 0 < value < np.inf:
-                raise OptionError(f"--sizes needs three positive lengths, not '{sizes}'")
-        self._sides = Sides(given)
-
-    def columns(self, frame: pd.DataFrame, results: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return block_volume and unfolded_volume of a batch of rows; nothing without sides."""
-        if self._sides is None:
-            return {}
-        volume = self._sides.of(frame).prod(axis=1)
-        unfolded = volume * results["volume_ratio"]
-        self._without += int(np.count_nonzero(np.isnan(volume)))
-        self._folded += float(np.nansum(volume))
-        self._unfolded += float(np.nansum(unfolded))
-        return {"block_volume": volume, "unfolded_volume": unfolded}
-
-    def facts(self) -> dict[str, Any]:
-        """Return the sums over all batches, for the summary."""
-        if self._sides is None:
-            return {}
-        return {
-            "block_volumes": {
-                "folded": self._folded,
-                "unfolded": self._unfolded,
-                "without_sides": self._without,
-            }
-        }
-
-    def warnings(self) -> list[str]:
-        """Say how many rows had no sides."""
-        if not self._without:
-            return []
-        return [f"{self._without} blocks have no positive sides, and so no volume"]
-
-
-def _whole(text: str, option: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
-    return int(text)

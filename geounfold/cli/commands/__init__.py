@@ -1,0 +1,1 @@
+"""One module for each command: check paths and options, read, compute, write all together."""

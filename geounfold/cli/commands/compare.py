@@ -1,0 +1,76 @@
+"""`geounfold compare`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
+
+from geounfold.cli.choices import MODEL_OPTIONS, config_file, listed, unfold_options
+from geounfold.cli.console import Console
+from geounfold.cli.reading import TRUE, files_given, read, triple
+from geounfold.cli.table import table_text
+from geounfold.errors import InputError, OptionError
+from geounfold.io import Outputs, holds_surface, read_points, read_surface
+from geounfold.io.tables import TABLE_ENDINGS, write_table
+
+if TYPE_CHECKING:
+    from geounfold.mesh import Floats, TriMesh
+
+
+def compare(args: Namespace, console: Console) -> None:
+    """Try flatteners on one body or surface and write a table of how they did."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, TABLE_ENDINGS)},
+        files_given(args.points, args.truth, config_file(args)),
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    how: dict[str, Any] = {"progress": console.stage}
+    if args.methods is not None:
+        how["methods"] = listed(args.methods)
+    elif args.truth is not None:
+        raise OptionError("--truth is compared with unfolded blocks: give --methods too")
+    if holds_surface(args.points):
+        given: TriMesh | Floats = read_surface(args.points)
+        _refuse_model_options(args)
+    else:
+        how["unfolding"] = unfold_options(args)
+        table = read(args.points, args, console)
+        given = table.points
+        if args.truth is not None:
+            how["truth"] = _truth(args, len(table), console)
+    from geounfold import comparison
+
+    every = "all" if args.methods is None else None
+    names = every if args.flatteners is None else listed(args.flatteners)
+    frame = comparison.compare(given, names, **how)
+    with outputs.writing() as parts:
+        write_table(parts["--output"], frame)
+    for _, row in frame[frame["error"] != ""].iterrows():
+        if "method" in row:
+            console.warn(f"method {row['method']} failed: {row['error']}")
+        else:
+            where = f"on the {row['surface']} surface"
+            console.warn(f"{row['flattener']} failed {where}: {row['error']}")
+    console.done(f"{len(frame)} rows written into {args.output}")
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    console.answer({"rows": rows}, lambda: table_text(frame))
+
+
+def _truth(args: Namespace, count: int, console: Console) -> Floats:
+    """Read where the blocks truly lay, row by row."""
+    console.stage(f"reading {args.truth}")
+    truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,))
+    if len(truth) != count:
+        raise InputError(
+            f"{args.truth}: has {len(truth)} rows, but {args.points} has {count}; rows must belong "
+            "together one by one"
+        )
+    return truth.points
+
+
+def _refuse_model_options(args: Namespace) -> None:
+    """Raise where options that shape a body's surfaces are given beside a surface."""
+    given = [f"--{name}" for name in (*MODEL_OPTIONS, "config") if hasattr(args, name)]
+    if given:
+        raise OptionError(f"{given[0]} needs a table of points; {args.points} is one surface")

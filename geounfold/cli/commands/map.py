@@ -1,0 +1,173 @@
+"""`geounfold map`: other points, wireframes or drill-holes carried with a saved map."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geounfold.cli.console import Console
+from geounfold.cli.endings import POINTS_OUT, SURFACES_OUT
+from geounfold.cli.frames import model_frame
+from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
+from geounfold.cli.places import flat_columns, place_counts, warn_of_outside
+from geounfold.cli.reading import files_given, open_table, triple
+from geounfold.errors import InputError, OptionError, OutputError
+from geounfold.io import Outputs, holds_surface, write_surface
+from geounfold.io.results import FOLDED, UNFOLDED, result_columns, world_columns
+from geounfold.io.surfaces import read_surface_with_meta
+from geounfold.io.tables import ending, existing_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from geounfold.blockmodel import ModelFrame
+    from geounfold.mesh import Floats
+
+
+def carry(args: Namespace, console: Console) -> None:
+    """Carry other points with a saved map, to the flat side or back; or drill-holes."""
+    check_hole_options(args)
+    if (args.points is None) != (args.output is None):
+        raise OptionError(
+            "map needs POINTS and -o OUT, or --holes with --samples-out or --traces-out"
+        )
+    if args.holes is None and args.samples_out is not None:
+        raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    frame = model_frame(args)
+    if frame is not None and (args.points is None or args.inverse):
+        raise OptionError("--origin is that of POINTS in the folded space: without --inverse")
+    if args.engine == "dask":
+        _carry_on_cluster(args, frame, console)
+        return
+    if args.scheduler is not None:
+        raise OptionError("--scheduler needs --engine dask")
+    if args.holes is not None and args.inverse:
+        raise OptionError("--holes are where they were drilled: without --inverse")
+    outputs = Outputs.planned(
+        {
+            "--output": (args.output, (*POINTS_OUT, *SURFACES_OUT)),
+            "--samples-out": (args.samples_out, POINTS_OUT),
+            "--traces-out": (args.traces_out, TRACE_ENDINGS),
+        },
+        files_given(args.map, args.points, *(args.holes or ())),
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    existing_file(Path(args.map))
+    if args.points is not None and _is_wireframe(args):
+        _carry_surface(args, frame, console, outputs)
+        return
+    prefer = (UNFOLDED,) if args.inverse else ()
+    table = (
+        None
+        if args.points is None
+        else open_table(args, console, args.output, prefer, frame=frame, keep=False)
+    )
+    holes = read_holes(args, console)
+    from geounfold import mapping
+
+    saved = mapping.load(args.map)
+    console.stage("carrying points")
+    names = FOLDED if args.inverse else UNFOLDED
+    places: Counter[str] = Counter()
+    unsolved: list[int] = []
+
+    def carried(_: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
+        there = saved.carry(points, inverse=args.inverse)
+        found = result_columns(names, there)
+        places.update(place_counts(found))
+        unsolved.append(there.unsolved if args.inverse else 0)
+        return found if frame is None else {**world_columns(points), **found}
+
+    traced = {} if holes is None else holes.carried(flat_columns(saved))
+    with outputs.writing() as parts:
+        if table is not None:
+            table.write_parts(parts["--output"], carried)
+        if holes is not None:
+            holes.write(parts, traced)
+    named = {name: place_counts(found) for name, found in traced.items() if found}
+    if table is not None:
+        named = {"points": dict(places), **named}
+        warn_of_outside(args.points, named["points"], console)
+    if sum(unsolved):
+        console.warn(
+            f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse "
+            f"of its {saved.coordinates} coordinates was not found there; they were left empty too"
+        )
+    for name in traced:
+        warn_of_outside(f"the holes' {name}", named[name], console)
+    written = {args.output: named.get("points"), args.samples_out: named.get("samples")}
+    counts = [f"{c['carried']} points carried into {p}" for p, c in written.items() if c]
+    console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
+    console.answer(named)
+
+
+def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Console) -> None:
+    """Carry a table in parts by a Dask cluster, into a folder of parts."""
+    if args.points is None or args.holes is not None:
+        raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
+    kind = ending(Path(args.output))
+    if kind not in (".csv", ".parquet"):
+        raise OptionError(
+            f"--engine dask writes a folder that ends in .csv or .parquet, not '{args.output}'"
+        )
+    from geounfold import mapping
+    from geounfold.clusters import Carrying, carry_folder
+    from geounfold.io.outputs import whole_folder
+    from geounfold.io.parts import parts_of
+
+    existing_file(Path(args.map))
+    if Path(args.output).resolve() == Path(args.points).resolve():
+        raise OutputError(f"{args.output}: --output is also an input; choose another folder")
+    place = None if frame is None else frame.to_world
+    how = Carrying(triple(args.columns), args.inverse, args.drop_invalid, kind, place)
+    with whole_folder(args.output, overwrite=args.overwrite, watcher=console.journal) as folder:
+        saved = mapping.load(args.map)
+        console.stage(f"looking through {args.points}")
+        parts = parts_of(args.points)
+        console.stage("carrying points")
+        found = carry_folder(args.scheduler, saved, parts, folder.absolute(), how)
+    dropped = found.pop("dropped")
+    if dropped:
+        console.warn(f"{args.points}: {dropped} rows without finite coordinates were left out")
+    warn_of_outside(args.points, found, console)
+    console.done(f"{found['carried']} points carried into {args.output}, {len(parts)} parts")
+    console.answer({"points": found, "parts": len(parts)})
+
+
+def _is_wireframe(args: Namespace) -> bool:
+    """Return whether `map` is to write a surface: as the output's ending, and both files, say."""
+    kind = ending(Path(args.output))
+    if kind not in SURFACES_OUT:
+        return False
+    return kind not in POINTS_OUT or holds_surface(args.points)
+
+
+def _carry_surface(
+    args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
+) -> None:
+    """Carry a wireframe's vertices and write the same triangles between them."""
+    console.stage(f"reading {args.points}")
+    mesh, meta = read_surface_with_meta(args.points)
+    from geounfold import mapping
+
+    saved = mapping.load(args.map)
+    console.stage("carrying vertices")
+    vertices = mesh.V if frame is None else frame.to_world(mesh.V)
+    carried = saved.carry(vertices, inverse=args.inverse)
+    lost = int(np.count_nonzero(~np.isfinite(carried.points).all(axis=1)))
+    if lost:
+        raise InputError(
+            f"{args.points}: {lost} of {len(mesh.V)} vertices lie too far from the control mesh to "
+            "be carried; cut the wireframe nearer to the body, or write a table of its vertices"
+        )
+    with outputs.writing() as parts:
+        write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
+    places = place_counts(result_columns(UNFOLDED, carried))
+    warn_of_outside(args.points, places, console)
+    console.done(f"{len(mesh.V)} vertices carried into {args.output}")
+    console.answer({"vertices": places})

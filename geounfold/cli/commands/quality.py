@@ -1,0 +1,73 @@
+"""`geounfold quality`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from geounfold.cli.choices import whole_number
+from geounfold.cli.console import Console
+from geounfold.cli.endings import JSON
+from geounfold.cli.reading import TRUE, files_given, triple
+from geounfold.errors import InputError
+from geounfold.io import Outputs, read_points, write_json
+from geounfold.io.results import UNFOLDED
+
+
+def quality(args: Namespace, console: Console) -> None:
+    """Print how well an unfolding keeps distances, and how far from a truth it is."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, JSON)},
+        files_given(args.folded, args.unfolded, args.truth),
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    folded = read_points(args.folded, triple(args.columns))
+    unfolded = read_points(args.unfolded, triple(args.unfolded_columns), prefer=(UNFOLDED,))
+    truth = None
+    if args.truth is not None:
+        truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,))
+    for other in (unfolded, truth):
+        if other is not None and len(other) != len(folded):
+            raise InputError(
+                f"{other.source}: has {len(other)} rows, but {folded.source} has {len(folded)}; "
+                "rows must belong together one by one"
+            )
+    from geounfold.cli.figures import quality_figures
+
+    console.stage("measuring")
+    figures = quality_figures(
+        folded.points,
+        unfolded.points,
+        None if truth is None else truth.points,
+        None if args.neighbours is None else whole_number(args.neighbours, "--neighbours"),
+    )
+    with outputs.writing() as parts:
+        if "--output" in parts:
+            write_json(parts["--output"], figures)
+    console.done("measured")
+    console.answer(figures, lambda: "".join(_figure_lines(figures)))
+
+
+def _figure_lines(figures: dict[str, Any]) -> list[str]:
+    """Return figures as aligned lines, groups of statistics as a table below the others."""
+    width = max(map(len, figures))
+    groups = {name: value for name, value in figures.items() if isinstance(value, dict)}
+    plain = {name: value for name, value in figures.items() if name not in groups}
+    lines = [f"{name:<{width}}  {_figure(value)}\n" for name, value in plain.items()]
+    for number, (name, group) in enumerate(groups.items()):
+        if number == 0:
+            head = "".join(f"{key:>13}" for key in group)
+            lines.append(f"\n{'':<{width}}{head}\n")
+        cells = "".join(f"{_figure(value):>13}" for value in group.values())
+        lines.append(f"{name:<{width}}{cells}\n")
+    return lines
+
+
+def _figure(value: Any) -> str:
+    """Return a figure to six digits; several one after the other; a dash for none."""
+    if isinstance(value, tuple | list):
+        return "  ".join(map(_figure, value))
+    if value is None:
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,91 @@
+"""`geounfold view`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from geounfold.cli.console import Console
+from geounfold.cli.endings import MAP, PICTURE
+from geounfold.cli.reading import TRUE, read
+from geounfold.errors import InputError, OptionError
+from geounfold.io import Outputs, PointTable
+from geounfold.io.results import UNFOLDED
+from geounfold.io.tables import ending, existing_file
+
+if TYPE_CHECKING:
+    from geounfold.mesh import Bools
+
+
+def view(args: Namespace, console: Console) -> None:
+    """Draw a saved map's control mesh, or points: folded and unfolded where a table has both."""
+    outputs = Outputs.planned(
+        {"--output": (args.output, PICTURE)},
+        [args.points],
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    if ending(Path(args.points)) in MAP:
+        if args.colour is not None:
+            raise OptionError("--colour needs a table of points, not a map")
+        existing_file(Path(args.points))
+        picture = _draw_map(args.points, console)
+    else:
+        picture = _draw_points(read(args.points, args, console), args.colour, console)
+    with outputs.writing() as parts:
+        parts["--output"].write_bytes(picture)
+    console.done(f"drawn into {args.output}")
+    console.answer({"output": args.output})
+
+
+def _draw_map(path: str, console: Console) -> bytes:
+    """Return a picture of a saved map's control mesh in both spaces."""
+    from geounfold import mapping, plotting
+    from geounfold.control import scaled
+
+    saved = mapping.load(path)
+    folded = saved.frame.to_world(saved.control.folded.V)
+    console.stage("drawing")
+    return plotting.png(plotting.draw_control(scaled(saved.control, folded, saved.frame.scale)))
+
+
+def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
+    """Return a picture of points, coloured by a column, by layer or by height."""
+    label = colour or _default_colour(table)
+    there = _with_image(table)
+    if not there.all():
+        console.warn(f"{table.source}: {np.count_nonzero(~there)} points without an image left out")
+    values = table.numbers(label)
+    if not np.isfinite(values[there]).all():
+        missing = np.flatnonzero(there & ~np.isfinite(values))
+        raise InputError(
+            f"{table.source}: column '{label}' has {len(missing)} missing or infinite values, "
+            f"the first in data row {missing[0] + 1}; choose a column that every row has"
+        )
+    from geounfold import plotting
+
+    console.stage("drawing")
+    for names, title in ((UNFOLDED, "unfolded"), (TRUE, "truth")):
+        if set(names) <= set(table.frame.columns) and names != table.columns:
+            twin = np.column_stack([table.numbers(name) for name in names])[there]
+            titles = ("unfolded" if table.columns == UNFOLDED else "folded", title)
+            return plotting.png(
+                plotting.draw_bodies(table.points[there], twin, values[there], label, titles=titles)
+            )
+    return plotting.png(plotting.draw_body(table.points[there], values[there], label))
+
+
+def _with_image(table: PointTable) -> Bools:
+    """Return which rows of a table do not lie outside the reach of the map that carried them."""
+    if "location" not in table.frame.columns:
+        return np.ones(len(table), dtype=bool)
+    return np.asarray(table.frame["location"].astype(str) != "outside", dtype=bool)
+
+
+def _default_colour(table: PointTable) -> str:
+    """Return the column to colour by: of a result, how high in the layer; else the height."""
+    result = {"stratigraphic", *UNFOLDED} <= set(table.frame.columns)
+    return "stratigraphic" if result else table.columns[2]

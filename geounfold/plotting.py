@@ -257,7 +257,7 @@ def _boxes(points: Floats, sides: Floats, colours: Floats, towards: Floats) -> A
     """
     pv = require("pyvista")
     quads = _QUADS[np.arange(3), (towards >= 0).astype(np.int64)]
-    corners = (points[:, None] + _CORNERS * sides).reshape(-1, 3)
+    corners = (points[:, None] + _CORNERS * np.atleast_2d(sides)[:, None]).reshape(-1, 3)
     faces = (8 * np.arange(len(points))[:, None, None] + quads).reshape(-1, 4)
     mesh = pv.PolyData(corners, np.column_stack([np.full(len(faces), 4), faces]).ravel())
     shaded = colours[:, None, :] * _SHADE[:, None]
@@ -289,8 +289,9 @@ def render_body(
         Matplotlib's name of the colour map.
     bands : int
         Number of distinct colours.
-    sides : (3,) float, optional
-        Sides of the boxes drawn; found from the points by default (see `block_sides`).
+    sides : (3,) or (n, 3) float, optional
+        Sides of the boxes drawn, of all or of each; found from the points by default (see
+        `block_sides`).
     options : ViewOptions, optional
         Where to look from, and the size.
 
@@ -312,12 +313,14 @@ def render_body(
     check_rendering()
     P = P - P.mean(axis=0)  # graphics cards count in single precision
     box = block_sides(P) if sides is None else np.asarray(sides, dtype=np.float64)
+    if box.shape not in ((3,), P.shape) or not (box > 0).all():
+        raise InputError(f"sides must be positive and of shape (3,) or {P.shape}")
     towards = _view_axes(options)[2]
-    shown = np.flatnonzero(_seen(P, box, towards))
+    shown = np.flatnonzero(_seen(P, np.atleast_2d(box).min(axis=0), towards))
     shown = shown[:: -(-len(shown) // options.max_blocks)]
     palette = require("matplotlib").colormaps[colours].resampled(bands)
     rgb = palette((v[shown] - limits[0]) / (limits[1] - limits[0]))[:, :3]
-    boxes = _boxes(P[shown], box, rgb, towards)
+    boxes = _boxes(P[shown], box if box.ndim == 1 else box[shown], rgb, towards)
     return _render(boxes, options, scalars="colour", rgb=True, lighting=False)
 
 
@@ -415,6 +418,7 @@ def draw_body(
     limits: Limits | None = None,
     colours: str = "viridis",
     bands: int = 256,
+    sides: Floats | None = None,
     options: ViewOptions | None = None,
 ) -> Figure:
     """Draw one body; for the parameters see `draw_bodies`."""
@@ -423,7 +427,7 @@ def draw_body(
     limits = limits or colour_limits(v)
     figure = _figure(9, 8.2 * options.size[1] / options.size[0] + 0.3)
     ax = figure.subplots()
-    image = render_body(P, v, limits, colours=colours, bands=bands, options=options)
+    image = render_body(P, v, limits, colours=colours, bands=bands, sides=sides, options=options)
     _show(ax, image, extents(P))
     _colour_bar(figure, [ax], limits, colours, bands, label)
     return figure
@@ -438,6 +442,7 @@ def draw_bodies(
     limits: Limits | None = None,
     colours: str = "viridis",
     bands: int = 256,
+    sides: Floats | None = None,
     titles: tuple[str, str] = ("folded", "unfolded"),
     options: ViewOptions | None = None,
 ) -> Figure:
@@ -455,8 +460,8 @@ def draw_bodies(
         Values of the first and last colour; 1st and 99th percentile by default.
     titles : (str, str)
         What the two spaces are called.
-    colours, bands, options
-        See `render_body`.
+    colours, bands, sides, options
+        See `render_body`; by default both spaces have the sides found in the folded one.
     """
     options = options or ViewOptions()
     pair = values if isinstance(values, tuple) else (values, values)
@@ -464,7 +469,9 @@ def draw_bodies(
     limits = limits or colour_limits(*(v for _, v in checked))
     figure = _figure(12.5, 12.5 * 0.46 * options.size[1] / options.size[0] + 0.3)
     axes = figure.subplots(1, 2)
-    look: dict[str, Any] = {"colours": colours, "bands": bands, "sides": block_sides(checked[0][0])}
+    if sides is None:
+        sides = block_sides(checked[0][0])
+    look: dict[str, Any] = {"colours": colours, "bands": bands, "sides": sides}
     for ax, (P, v), title in zip(axes, checked, titles, strict=True):
         image = render_body(P, v, limits, options=options, **look)
         _show(ax, image, f"{title}: {extents(P)}")

@@ -190,3 +190,17 @@ def test_a_trial_that_dies_is_told_apart_from_a_missing_library(monkeypatch, loa
     monkeypatch.setattr(plotting, "_loads", loads)
     with pytest.raises(MissingDependencyError, match=message):
         check_rendering.__wrapped__()
+
+
+def test_blocks_are_drawn_in_their_own_sides() -> None:
+    # One block of 40 m beside one of 10 m, seen from above: areas are 16 to 1.
+    points = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
+    sides = np.array([[40.0, 40.0, 40.0], [10.0, 10.0, 10.0]])
+    above = ViewOptions(azimuth=0.0, elevation=90.0, size=(800, 400))
+    image = render_body(points, np.array([0.0, 1.0]), (0.0, 1.0), sides=sides, options=above)
+    ends = ([68, 1, 84], [253, 231, 37])  # of viridis
+    large, small = (np.count_nonzero(np.abs(image - np.array(e)).max(axis=2) < 30) for e in ends)
+    # Of the small one's 30 x 30 pixels, one along each edge is mixed with the ground: 13 %.
+    assert abs(large / small / 16 - 1) < 0.15
+    with pytest.raises(InputError, match="sides must be positive"):
+        render_body(points, np.array([0.0, 1.0]), (0.0, 1.0), sides=-sides, options=above)

@@ -25,6 +25,7 @@ _INSIDE_SHARE = 0.2  # of the blocks drawn at least, so that slices of large bod
 _LOOSE = 0.001  # how much a gradient is held to a rotation, which sheets of one block need
 _SPARSE = 1.3  # typical spacing over the lattice's step from which blocks are larger than steps
 _FINEST = 8  # sub-blocks along a side that are told apart
+_LEVEL = 1e-3  # slope of axes that are drawn as level
 _TORN = 2.5  # neighbours that move apart by this factor are none
 
 
@@ -72,6 +73,13 @@ def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | Non
     if found is not None and point_spacing(points) < _SPARSE * found.steps.max():
         return Shape(axes, found.steps)
     return None
+
+
+def level_sides(shape: Shape | None) -> Floats | None:
+    """Return every block's sides along the world's axes, (n, 3); None where they do not lie so."""
+    if shape is None or not np.allclose(shape.axes, np.eye(3), rtol=0, atol=_LEVEL):
+        return None
+    return shape.sizes
 
 
 def _sizes(columns: Mapping[str, ArrayLike], count: int) -> Floats | None:

@@ -20,6 +20,7 @@ from geounfold.errors import InputError
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.plotting import ViewOptions, check_rendering
 from geounfold.quality import NEIGHBOURS, neighbours, nmd
+from geounfold.report.blocks import block_shape, level_sides
 from geounfold.report.charts import distribution
 from geounfold.report.columns import MEANINGS
 from geounfold.report.exploration import exploration_html
@@ -126,7 +127,9 @@ def report_html(
         unit=str(mapping(summary.get("input")).get("unit", "")),
         total=body.total,
     )
-    stills = pictures(body.folded, body.unfolded, body.results, body.distances, view)
+    spaces = body.folded, body.unfolded
+    sides = level_sides(block_shape(body.folded, body.columns))
+    stills = pictures(*spaces, body.results, body.distances, sides, view)
     title = _title(summary, body.total)
     parts = [
         _verdict_html(verdict(summary), summary.get("warnings", [])),

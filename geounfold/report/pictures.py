@@ -22,6 +22,7 @@ def pictures(
     Y: Floats,
     drawn: Mapping[str, Floats],
     distances: tuple[Floats, Floats] | None,
+    sides: Floats | None,
     view: ViewOptions | None,
 ) -> Iterator[str]:
     """Yield figures as HTML: layers, neighbour mean distances, and the main distortions.
@@ -34,22 +35,24 @@ def pictures(
         Columns of the result.
     distances : two of (n,), optional
         Neighbour mean distances in both spaces.
+    sides : (n, 3), optional
+        Of the boxes drawn, where blocks differ in theirs.
     view : ViewOptions, optional
         Where to look from.
     """
+    common: dict[str, Any] = {"sides": sides, "options": view}
     if "stratigraphic" in drawn:
-        figure = draw_bodies(
-            X, Y, drawn["stratigraphic"], "stratigraphic", limits=(0.0, 1.0), bands=8, options=view
-        )
+        layers: dict[str, Any] = {"limits": (0.0, 1.0), "bands": 8, **common}
+        figure = draw_bodies(X, Y, drawn["stratigraphic"], "stratigraphic", **layers)
         yield _figure(figure, "Layers: 0 at the bottom surface, 1 at the top. True to scale.")
     if distances is not None:
         label = "neighbour mean distance"
-        figure = draw_bodies(X, Y, distances, label, colours="cividis", options=view)
+        figure = draw_bodies(X, Y, distances, label, colours="cividis", **common)
         yield _figure(figure, "Mean distance to the neighbours in the folded body.")
     for name in _PICTURED:
         if name in drawn:
             label, meaning, _ = MEANINGS[name]
-            look: dict[str, Any] = {"colours": "cividis", "options": view}
+            look: dict[str, Any] = {"colours": "cividis", **common}
             if name == "volume_ratio":
                 look |= {"colours": "RdYlBu_r", "limits": ratio_limits(drawn[name])}
             figure = draw_bodies(X, Y, drawn[name], label, **look)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,14 +69,31 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
     from geounfold import plotting
 
     console.stage("drawing")
+    look = _boxes_of(table, there)
     for names, title in ((UNFOLDED, "unfolded"), (TRUE, "truth")):
         if set(names) <= set(table.frame.columns) and names != table.columns:
             twin = np.column_stack([table.numbers(name) for name in names])[there]
             titles = ("unfolded" if table.columns == UNFOLDED else "folded", title)
+            look |= {"titles": titles}
             return plotting.png(
-                plotting.draw_bodies(table.points[there], twin, values[there], label, titles=titles)
+                plotting.draw_bodies(table.points[there], twin, values[there], label, **look)
             )
-    return plotting.png(plotting.draw_body(table.points[there], values[there], label))
+    return plotting.png(plotting.draw_body(table.points[there], values[there], label, **look))
+
+
+def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:
+    """Return blocks' sides for what draws them; nothing where all are alike, or unknown."""
+    from geounfold.blockmodel.sizes import Sides, size_columns
+    from geounfold.report.blocks import block_shape, level_sides
+
+    with suppress(InputError):  # several sets of columns: none is taken unasked
+        found = size_columns([str(name) for name in table.frame.columns])
+        if found is not None:
+            sides = Sides(found).of(table.frame)[there]
+            columns = dict(zip(found, sides.T, strict=True))
+            known = level_sides(block_shape(table.points[there], columns))
+            return {} if known is None else {"sides": known}
+    return {}
 
 
 def _with_image(table: PointTable) -> Bools:

@@ -66,7 +66,7 @@ format: $(STAMP)  ## put the code into the standard format
 
 bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to 10 M blocks
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
-	$(BIN)/python tests/benchmarks/scale.py --readme --profile $(SCALE_ARGS)
+	$(BIN)/python tests/benchmarks/scale.py --page --profile $(SCALE_ARGS)
 
 soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)

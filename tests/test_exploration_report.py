@@ -84,7 +84,8 @@ def test_the_report_and_the_summary_hold_the_exploration(folder: Path, tmp_path:
         assert "CU" in words
         assert f"<figcaption>{words}</figcaption>" in page
         assert ElementTree.fromstring(base64.b64decode(data)).tag.endswith("svg")
-    # The README's promise for all of a page is 12 MB; five drawings of lines take a tenth at most.
+    # The promise for all of a page (docs/how-to/report.md) is 12 MB; five drawings of lines take a
+    # tenth at most.
     assert sum(len(data) for _, data in figures) < 1.2e6
     told = json.loads(summary.read_text(encoding="utf-8"))["exploration"]
     assert told["grade"] == "CU"

@@ -1,7 +1,8 @@
 """Time one simulated body at block sizes from 21,600 to 10 million blocks; keep a table.
 
     python tests/benchmarks/scale.py [--sizes 21600 1e5 1e6 5e6 1e7] [--again] [--profile]
-                                     [--folder DIR] [--out data/bench.csv] [--readme]
+                                     [--folder DIR] [--out data/bench.csv] [--page]
+                                     [--figure docs/assets/profile_1M.png]
 
 The body is always the same, open folds 100 m thick; the blocks get smaller.  Every size is a row of
 the table, written as soon as it is measured; sizes that are there are left alone, so that a run
@@ -30,6 +31,8 @@ from bench import BenchmarkError, measure
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+PAGE = ROOT / "docs" / "results" / "speed.md"
+FIGURE = ROOT / "docs" / "assets" / "profile_1M.png"
 SIZES = (21_600, 100_000, 1_000_000, 5_000_000, 10_000_000)
 STAGES = ("frame", "hull", "split", "sheet", "map", "certificate", "quality")
 FLOORS = ("read_csv", "tree", "nearest", "in_element", "carry")
@@ -138,7 +141,7 @@ def write(path: Path, rows: dict[int, dict[str, float]]) -> None:
 
 
 def table(rows: dict[int, dict[str, float]]) -> str:
-    """Return the table for the README."""
+    """Return the table for the page on speed."""
     head = (
         "| blocks | whole, s | us per block | peak MiB | fit, s | other stages, s | files and "
         "start, s | times `read_csv` | carrying, M points/s | carrying, times a nearest "
@@ -165,12 +168,11 @@ def table(rows: dict[int, dict[str, float]]) -> str:
     return "\n".join(lines) + f"\n\n{THESIS}\n"
 
 
-def into_readme(text: str) -> None:
-    """Put the table between the README's two marks."""
-    path = ROOT / "README.md"
-    content = path.read_text(encoding="utf-8")
+def into_page(text: str) -> None:
+    """Put the table between the page's two marks."""
+    content = PAGE.read_text(encoding="utf-8")
     start, end = content.index(BEGIN) + len(BEGIN), content.index(END)
-    path.write_text(f"{content[:start]}\n{text}{content[end:]}", encoding="utf-8")
+    PAGE.write_text(f"{content[:start]}\n{text}{content[end:]}", encoding="utf-8")
 
 
 def profile(python: str, folder: Path, blocks: int, out: Path) -> None:
@@ -240,7 +242,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--profile", action="store_true", help="draw the profile of 1 M blocks")
     parser.add_argument("--folder", type=Path, default=ROOT / ".benchmarks" / "scale")
     parser.add_argument("--out", type=Path, default=ROOT / "data" / "bench.csv")
-    parser.add_argument("--readme", action="store_true", help="put the table into the README")
+    parser.add_argument("--figure", type=Path, default=FIGURE, help="where the profile goes")
+    parser.add_argument("--page", action="store_true", help=f"put the table into {PAGE.name}")
     parser.add_argument("--python", default=sys.executable, help="interpreter that has geounfold")
     args = parser.parse_args(argv)
     args.folder.mkdir(parents=True, exist_ok=True)
@@ -257,11 +260,11 @@ def main(argv: list[str] | None = None) -> int:
             continue
         write(args.out, rows)
     if args.profile:
-        profile(args.python, args.folder, 1_000_000, args.out.with_name("profile_1M.png"))
+        profile(args.python, args.folder, 1_000_000, args.figure)
     if rows:
         sys.stdout.write(table(rows))
-        if args.readme:
-            into_readme(table(rows))
+        if args.page:
+            into_page(table(rows))
     return status
 
 

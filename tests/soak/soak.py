@@ -385,7 +385,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--only", type=int, help="unfold this seed alone, with a traceback")
     parser.add_argument("--work", type=Path, default=ROOT / "soak")
     parser.add_argument("--summary", type=Path, default=ROOT / "data" / "soak.json")
-    parser.add_argument("--figure", type=Path, default=ROOT / "data" / "soak.png")
+    parser.add_argument("--figure", type=Path, default=ROOT / "docs" / "assets" / "soak.png")
     parser.add_argument("--restart", action="store_true", help="forget the earlier rows")
     args = parser.parse_args(argv)
     args.options = dict(args.options)

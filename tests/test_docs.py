@@ -91,6 +91,31 @@ def test_every_page_is_in_the_navigation() -> None:
     assert named == {str(p.relative_to(DOCS)) for p in PAGES}
 
 
+def _anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as code hosts and the site make them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.M)
+    return {re.sub(r"[^\w -]", "", h).strip().lower().replace(" ", "-") for h in headings}
+
+
+def test_the_links_of_the_readme_lead_somewhere() -> None:  # those of the pages: mkdocs, strictly
+    links = re.findall(r"\]\((?!http)([^)#]*)(?:#([^)]*))?\)", README.read_text())
+    assert links
+    for path, anchor in links:
+        assert (ROOT / path).is_file(), path
+        assert not anchor or anchor in _anchors(ROOT / path), (path, anchor)
+
+
+def test_files_and_targets_that_the_pages_name_exist() -> None:
+    text = "\n".join(page.read_text() for page in (README, *PAGES))
+    paths = set(re.findall(r"\b(?:data|notebooks|tests)/[\w./]*\w", text))
+    targets = set(re.findall(r"(?:`|\$ )make ([\w-]+)", text))
+    made = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
+    assert len(paths) > 1
+    assert [path for path in sorted(paths) if not (ROOT / path).exists()] == []
+    assert targets
+    assert targets <= made
+
+
 def commands(page: Path) -> list[list[str]]:
     """Return the arguments of a page's runs of geounfold, in order."""
     text = "\n".join(re.findall(r"```console\n(.*?)```", page.read_text(), re.S))

@@ -1,5 +1,7 @@
 """Table of the bodies that fight back: how well each unfolds, and whether that is proved.
 
+It stands in docs/results/fight-back.md.
+
     python tests/benchmarks/fight_back.py [NAME ...] [-o TABLE.md]
 
 Figures against the exact truth: epsilon(W, Y) (thesis, equation 2.4) beside what doing nothing
@@ -21,8 +23,8 @@ from geounfold.synthetic import CASES
 
 LARGE = ("large", "thin_wide")
 COLUMNS = (
-    *("body", "blocks", "nothing", "epsilon", "RMS", "horizons", "strain"),
-    *("proved", "rung", "seconds", "proof"),
+    *("body", "blocks", "doing nothing", "epsilon(W, Y)", "RMS, blocks", "horizons, blocks"),
+    *("strain", "proved", "rung", "CPU s", "proof"),
 )
 HEAD = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"
 

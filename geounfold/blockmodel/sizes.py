@@ -11,16 +11,15 @@ import pandas as pd
 from geounfold.blockmodel.model import BlockModel
 from geounfold.errors import InputError
 from geounfold.io._text import listing
-from geounfold.io.coordinates import Triple, numbers, plain_name, readable_numbers
+from geounfold.io.coordinates import (
+    Triple,
+    numbers,
+    plain_name,
+    readable_numbers,
+    side_families,
+)
 from geounfold.lattice import measure_lattice
 from geounfold.mesh import Floats
-
-# Spelled without case, spaces, underscores and units, as for coordinates.
-_PATTERNS = (
-    "{}inc", "{}increment", "d{}", "{}size", "size{}", "{}blocksize", "blocksize{}", "{}length",
-    "length{}", "{}len", "dim{}", "{}dim", "{}dimension", "{}width", "block{}", "{}block",
-)  # fmt: skip
-_FAMILIES = tuple((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS)
 
 
 def size_columns(names: Sequence[str]) -> Triple | None:
@@ -37,7 +36,7 @@ def size_columns(names: Sequence[str]) -> Triple | None:
     ('XINC', 'YINC', 'ZINC')
     """
     plain = [plain_name(name) for name in names]
-    found = [family for family in _FAMILIES if set(family) <= set(plain)]
+    found = side_families(names)
     if not found:
         return None
     if len(found) > 1 or any(plain.count(name) > 1 for name in found[0]):

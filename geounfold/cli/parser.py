@@ -19,10 +19,10 @@ _FORMATS = """
 
 formats of points: .csv .csv.gz .parquet, GSLIB .gslib .geoeas .dat .gs (text as codes), VTK .vtu
   .vtp and .vti (read only; of solid cells the centres), GOCAD .vs (text as codes) and .ts (read
-  only), OMF 1 .omf, .geoh5
+  only), OMF .omf, .geoh5 (of block models the centroids, with dx, dy, dz and i, j, k)
 formats of surfaces: .ply .obj .off .stl (single precision), .vtp, GOCAD .ts, .dxf (faces), .omf,
   .geoh5, or a table with columns x, y, z, v1, v2, v3
-  OMF, geoh5 and DXF need: pip install 'geounfold[formats]'"""
+  geoh5 and DXF, and OMF to be written, need: pip install 'geounfold[formats]'"""
 _RESULTS = """\
 results:
   unfolded_x, unfolded_y, unfolded_z   coordinates with the folds taken out, in the input's

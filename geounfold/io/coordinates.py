@@ -42,6 +42,13 @@ _FAMILIES: tuple[Triple, ...] = (
     *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
     *_NAMED,
 )
+_SIDE_PATTERNS = (
+    "{}inc", "{}increment", "d{}", "{}size", "size{}", "{}blocksize", "blocksize{}", "{}length",
+    "length{}", "{}len", "dim{}", "{}dim", "{}dimension", "{}width", "block{}", "{}block",
+)  # fmt: skip
+_SIDES: tuple[Triple, ...] = tuple(
+    (p.format("x"), p.format("y"), p.format("z")) for p in _SIDE_PATTERNS
+)
 # Looked for only where none of the above is complete: x, y, z beside elevation is no question.
 _MIXED: tuple[Triple, ...] = tuple(
     (a, b, c)
@@ -59,6 +66,18 @@ def plain_name(name: object) -> str:
     """Return a column name without case, unit in brackets, spaces and underscores."""
     bare = re.sub(r"[(\[][^)\]]*[)\]]\s*$", "", str(name))
     return re.sub(r"[\s_\-.]+", "", bare).casefold()
+
+
+def side_families(names: Sequence[str]) -> list[Triple]:
+    """Return the sets of columns that may be blocks' sides, by their `plain_name`.
+
+    Examples
+    --------
+    >>> side_families(["x", "y", "z", "XINC", "YINC", "ZINC"])
+    [('xinc', 'yinc', 'zinc')]
+    """
+    plain = {plain_name(name) for name in names}
+    return [family for family in _SIDES if set(family) <= plain]
 
 
 def parse_columns(text: str) -> Triple:

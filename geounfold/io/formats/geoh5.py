@@ -1,9 +1,9 @@
 """geoh5, the open format of Geoscience ANALYST, through geoh5py (extra ``formats``).
 
-One object of a workspace is read: points, else a block model's cells; or a surface. The object's
-coordinate reference and the workspace's unit are carried; a workspace must have a unit, so one
-written without any says metres, as the library's own do. Floats come back bit for bit, whole
-numbers beyond 32 bits as floats.
+One object of a workspace is read: points, else a block model's cells with their sides (dx, dy, dz)
+and places (i, j, k); or a surface. The object's coordinate reference and the workspace's unit are
+carried; a workspace must have a unit, so one written without any says metres, as the library's own
+do. Floats come back bit for bit, whole numbers beyond 32 bits as floats.
 
 geoh5py asks for NumPy below 2 on Python 3.11, which geounfold does not work with: the extra
 brings it from Python 3.12 on.
@@ -25,8 +25,10 @@ import numpy as np
 from geounfold.errors import InputError, MissingDependencyError, OutputError
 from geounfold.io._text import listing
 from geounfold.io.formats.frames import flattened
+from geounfold.io.formats.grids import with_sides
 from geounfold.io.formats.registry import Meta, Points, Surface, require
 from geounfold.io.formats.units import unit_name
+from geounfold.mesh import Floats, Ints
 
 _WORDS = {"m": "meter", "ft": "feet"}
 _LARGEST = 2**31 - 1
@@ -44,13 +46,14 @@ def read_points(path: Path) -> Points:
     with _workspace(path) as (workspace, objects):
         points = _one(path, workspace, objects.Points)
         if points is not None:
-            xyz, location = np.asarray(points.vertices, dtype=np.float64), "VERTEX"
-        else:
-            points = _one(path, workspace, objects.BlockModel)
-            if points is None:
-                raise InputError(f"{path}: holds neither points nor a block model")
-            xyz, location = np.asarray(points.centroids, dtype=np.float64), "CELL"
-        return Points(xyz, _values(points, location, len(xyz)), _meta(workspace, points))
+            xyz = np.asarray(points.vertices, dtype=np.float64)
+            return Points(xyz, _values(points, "VERTEX", len(xyz)), _meta(workspace, points))
+        model = _one(path, workspace, objects.BlockModel)
+        if model is None:
+            raise InputError(f"{path}: holds neither points nor a block model")
+        xyz = np.asarray(model.centroids, dtype=np.float64)
+        values = with_sides(_values(model, "CELL", len(xyz)), *_cells(model))
+        return Points(xyz, values, _meta(workspace, model))
 
 
 def write_points(path: Path, points: Points) -> None:
@@ -162,6 +165,20 @@ def _values(parent: Any, location: str, rows: int) -> dict[str, np.ndarray]:
         if array.size and array.size % rows == 0:
             columns |= flattened(child.name, array, rows)
     return columns
+
+
+def _cells(model: Any) -> tuple[Floats, Ints]:
+    """Return sides and places of a block model's cells, in the order of its centroids.
+
+    Along z, cells may be counted downwards: then their steps are negative.
+    """
+    widths = [np.abs(np.asarray(getattr(model, f"{a}_cells"), dtype=np.float64)) for a in "uvz"]
+    # As the library lays its centroids out: z runs fastest, then u, then v.
+    v, u, z = np.unravel_index(
+        np.arange(model.n_cells), (len(widths[1]), len(widths[0]), len(widths[2]))
+    )
+    ijk = np.column_stack([u, v, z]).astype(np.int64)
+    return np.column_stack([widths[a][ijk[:, a]] for a in range(3)]), ijk
 
 
 def _refer(made: Any, meta: Meta) -> None:

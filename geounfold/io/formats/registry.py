@@ -69,7 +69,7 @@ class Format:
     numbers_only : bool
         Text columns cannot be written (see `coded`).
     library : str
-        The optional one that the module needs; empty for none.
+        The optional one that the module needs, to write at least; empty for none.
     """
 
     name: str

@@ -17,6 +17,7 @@ import numpy as np
 
 from geounfold.errors import InputError
 from geounfold.io.formats.frames import flattened
+from geounfold.io.formats.grids import places, with_sides
 from geounfold.io.formats.registry import Meta, Points, Surface
 from geounfold.mesh import Floats
 
@@ -26,7 +27,8 @@ _META = ("unit", "crs")
 def read_points(path: Path) -> Points:
     """Return the centres of a file's solid cells with cell data; without any, its points.
 
-    Cells that VTK hides as ghosts are left out.
+    Cells that VTK hides as ghosts are left out. Boxes bring their sides along
+    (dx, dy, dz), those of an image their places too (i, j, k).
     """
     mesh = _read(path)
     solid = _solid(mesh)
@@ -34,7 +36,8 @@ def read_points(path: Path) -> Points:
         hidden = mesh.cell_data.get("vtkGhostType", np.zeros(mesh.n_cells, dtype=np.uint8))
         keep = solid & (np.asarray(hidden) == 0)
         centres = np.asarray(mesh.cell_centers().points, dtype=np.float64)
-        return Points(centres[keep], _values(mesh.cell_data, mesh.n_cells, keep), _meta(mesh))
+        values = _with_sides(mesh, _values(mesh.cell_data, mesh.n_cells, keep), keep)
+        return Points(centres[keep], values, _meta(mesh))
     if not mesh.n_points:
         raise InputError(f"{path}: holds no points")
     keep = np.ones(mesh.n_points, dtype=bool)
@@ -144,6 +147,50 @@ def _solid(mesh: Any) -> np.ndarray:
         )
     }  # fmt: skip
     return ~np.isin(mesh.celltypes, list(flat))
+
+
+def _with_sides(
+    mesh: Any, values: dict[str, np.ndarray], keep: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the values of kept cells, with sides where these are blocks along the file's axes."""
+    import pyvista
+
+    if isinstance(mesh, pyvista.ImageData):
+        ijk = places([n - 1 for n in mesh.dimensions], "u")[keep]
+        sides = np.broadcast_to(np.asarray(mesh.spacing, dtype=np.float64), ijk.shape)
+        return with_sides(values, sides, ijk)
+    box = _box_sides(mesh, keep)
+    return values if box is None else with_sides(values, box)
+
+
+def _box_sides(mesh: Any, keep: np.ndarray) -> Floats | None:
+    """Return the sides (n, 3) of kept cells; None where they are not all boxes of one cell type."""
+    import pyvista
+
+    # Of a cell's eight corners, those at the ends of the edges from the first, and the opposite.
+    ends = {
+        int(pyvista.CellType.VOXEL): [1, 2, 4, 7],
+        int(pyvista.CellType.HEXAHEDRON): [1, 3, 4, 6],
+    }
+    kinds = np.unique(mesh.celltypes[keep])
+    if len(kinds) != 1 or int(kinds[0]) not in ends:
+        return None
+    corners = mesh.cells_dict[int(kinds[0])][keep[mesh.celltypes == kinds[0]]]
+    points = np.asarray(mesh.points, dtype=np.float64)
+    edges = points[corners[:, ends[int(kinds[0])]]] - points[corners[:, :1]]
+    along, opposite = edges[:, :3], edges[:, 3]
+    sides: Floats = np.linalg.norm(along, axis=2)
+    # Corners lie where the floats of the file's own precision put them.
+    room = 1e-6 * sides.max(axis=1) + 8 * _spacing(mesh.points)
+    skew = np.einsum("nac,nbc->nab", along, along) * (1 - np.eye(3))
+    square = np.abs(skew).max(axis=(1, 2)) <= room * sides.max(axis=1)
+    whole = np.abs(along.sum(axis=1) - opposite).max(axis=1) <= room
+    return sides if (square & whole).all() else None
+
+
+def _spacing(points: Any) -> float:
+    """Return the distance between neighbouring floats at the largest coordinate."""
+    return float(np.spacing(np.abs(points).max()))
 
 
 def _is_cloud(mesh: Any) -> bool:

@@ -1,0 +1,87 @@
+"""What all versions of OMF have in common: elements of a kind, with values beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from geounfold.io.formats.frames import flattened
+from geounfold.io.formats.grids import Blocks, with_sides
+from geounfold.io.formats.registry import Meta, Points
+from geounfold.io.formats.units import unit_name
+from geounfold.io.tables import unique_names
+
+
+class Kind(Enum):
+    """What an element is to geounfold."""
+
+    POINTS = "points"
+    BLOCKS = "blocks"
+    SURFACE = "surface"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """One element of a project, loaded when it is asked for.
+
+    Attributes
+    ----------
+    name : str
+        As in the file.
+    kind : Kind
+        What it is.
+    load : function
+        Returns its `Points`, or its `Surface`.
+    """
+
+    name: str
+    kind: Kind
+    load: Callable[[], Any]
+
+
+def values_by_name(found: Iterable[tuple[str, np.ndarray]], rows: int) -> dict[str, np.ndarray]:
+    """Return arrays as columns: nameless ones numbered, names that come again too.
+
+    Raises
+    ------
+    ValueError
+        An array has not one value, or vector, for each row.
+    """
+    arrays = list(found)
+    names = unique_names(name or f"data_{k}" for k, (name, _) in enumerate(arrays))
+    columns: dict[str, np.ndarray] = {}
+    for name, (_, array) in zip(names, arrays, strict=True):
+        if len(array) != rows:
+            raise ValueError(f"'{name}' has {len(array)} values for {rows} places")
+        columns |= flattened(name, array, rows)
+    return columns
+
+
+def block_points(blocks: Blocks, found: Iterable[tuple[str, np.ndarray]], meta: Meta) -> Points:
+    """Return a block model's centroids with its values, sides and places."""
+    values = values_by_name(found, len(blocks.ijk))
+    return Points(blocks.centres, with_sides(values, blocks.sides, blocks.ijk), meta)
+
+
+def words_of(codes: np.ndarray, legend: Mapping[int, str]) -> np.ndarray:
+    """Return the words of codes (n,), blank where a code has none.
+
+    Examples
+    --------
+    >>> words_of(np.array([7, 3, -1]), {3: "ore", 7: "waste"}).tolist()
+    ['waste', 'ore', '']
+    """
+    known, back = np.unique(codes, return_inverse=True)
+    words = np.array([str(legend.get(int(code), "")) for code in known], dtype=object)
+    return np.asarray(words[back.ravel()], dtype=object) if len(words) else words
+
+
+def told(unit: str | None, reference: str | None) -> Meta:
+    """Return what is known of the coordinates."""
+    meta = {"unit": unit_name(unit or ""), "crs": (reference or "").strip()}
+    return {key: value for key, value in meta.items() if value}

@@ -421,6 +421,15 @@ def cut(path: Path, out: Path, share: float) -> Path:
     return out
 
 
+def test_an_array_before_the_files_beginning_is_one_line(tmp_path: Path) -> None:
+    content = (DATA / "version1.omf").read_bytes()
+    # Behind the header of 60 bytes stands the first array, that of the gold.
+    assert content.count(b'"start": 60,') == 1
+    (tmp_path / "v.omf").write_bytes(content.replace(b'"start": 60,', b'"start": -9,'))
+    with pytest.raises(InputError, match=r"v\.omf: is an OMF file, but damaged: .*nvalid argument"):
+        read_points(tmp_path / "v.omf")
+
+
 @pytest.mark.parametrize("name", ["version1", "prerelease", "bunny_blocks"])
 @pytest.mark.parametrize("share", [0.02, 0.5, 0.98])
 def test_cut_files_are_one_line(name: str, share: float, tmp_path: Path) -> None:
@@ -460,6 +469,8 @@ def _set(key: str, value: Any) -> Callable[[dict[str, Any]], None]:
         ("prerelease_tensor", _set("tensor_u", [1.0, -2.0]), "sides that are no lengths"),
         ("prerelease_tensor", _set("tensor_u", [1.0]), "'au' has 24 values for 12 places"),
         ("prerelease_regular", _set("block_count", [2, 2, 3]), "8 counts of sub-blocks for 12"),
+        ("prerelease_regular", _set("block_count", [9, 10**12, 9]), "of 9 x 1000000000000 x 9"),
+        ("prerelease_regular", _set("block_count", [2, 2, 0]), "of 2 x 2 x 0 blocks"),
         ("prerelease_divided", _set("sub_block_count", [3, 2, 1]), "other than the stated number"),
         ("prerelease_free", lambda p: p["elements"][0]["sub_block_sizes"].update(
             array=p["elements"][0]["sub_block_corners"]["array"]), "reaches out of its block"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -16,6 +17,8 @@ _SIDES = ("dx", "dy", "dz")
 _INDICES = ("i", "j", "k")
 # Cosine of the angle between axes of a frame: single precision of a unit vector, and room.
 _SQUARE = 1e-5
+# More blocks than these are a damaged file's.
+_MOST_BLOCKS = 2**31
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ def tensor_grid(corner: ArrayLike, axes: ArrayLike, widths: Sequence[ArrayLike])
 def regular_grid(corner: ArrayLike, axes: ArrayLike, count: ArrayLike, side: ArrayLike) -> Grid:
     """Return a grid of equal blocks: how many along each axis, and their three lengths."""
     numbers = [int(n) for n in np.asarray(count).reshape(3)]
+    _check_number(numbers)
     lengths = np.asarray(side, dtype=np.float64).reshape(3)
     u, v, w = (np.full(n, d) for n, d in zip(numbers, lengths, strict=True))
     starts = [np.arange(n) * d for n, d in zip(numbers, lengths, strict=True)]
@@ -116,6 +120,7 @@ def places(shape: Sequence[int], fastest: Literal["u", "w"]) -> Ints:
     >>> places((2, 1, 2), "w").tolist()
     [[0, 0, 0], [0, 0, 1], [1, 0, 0], [1, 0, 1]]
     """
+    _check_number(shape)
     numbers = np.arange(int(np.prod(shape)))
     order: Literal["F", "C"] = "F" if fastest == "u" else "C"
     return np.column_stack(np.unravel_index(numbers, shape, order=order)).astype(np.int64)
@@ -149,6 +154,11 @@ def _frame(corner: ArrayLike, axes: ArrayLike) -> tuple[Floats, Floats]:
     if (np.abs(skew) > _SQUARE).any():
         raise ValueError("the block model's axes are not at right angles")
     return np.asarray(corner, dtype=np.float64).reshape(3), unit
+
+
+def _check_number(shape: Sequence[int]) -> None:
+    if min(shape) < 1 or math.prod(int(n) for n in shape) > _MOST_BLOCKS:
+        raise ValueError(f"a block model of {' x '.join(str(n) for n in shape)} blocks")
 
 
 def _checked(grid: Grid) -> Grid:

@@ -15,6 +15,7 @@ reference are carried where the version has them. Floats come back bit for bit.
 
 from __future__ import annotations
 
+import errno
 import struct
 import zipfile
 import zlib
@@ -97,7 +98,9 @@ def _damage_told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno is not None:  # the disk's fault; that of a broken gzip or Parquet has none
+        # The disk's fault, but that a broken gzip or Parquet has no number, and that a place before
+        # the file's beginning, to which a wrong number leads, is no valid one.
+        if error.errno not in (None, errno.EINVAL):
             raise
         raise _damaged(path, error) from error
     except (

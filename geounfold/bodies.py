@@ -16,6 +16,7 @@ from geounfold.errors import InputError, OptionError
 from geounfold.frame import Frame
 from geounfold.lattice import Lattice, distinct, lattice_indices, measure_lattice, point_spacing
 from geounfold.mesh import Floats, Ints
+from geounfold.threads import cores
 
 MIN_POINTS = 50
 """Fewest distinct points of a body: a sheet of 5 x 5 blocks, two thick."""
@@ -348,7 +349,7 @@ def _in_three_directions(X: Floats) -> bool:
 
 def _neighbours(tree: cKDTree, points: Floats, count: int) -> tuple[Floats, Ints]:
     """Return distances and numbers of the nearest points, themselves first, (m, count) each."""
-    distance, near = tree.query(points, k=min(count, tree.n), workers=-1)
+    distance, near = tree.query(points, k=min(count, tree.n), workers=cores())
     return np.asarray(distance), np.asarray(near, dtype=np.int64)
 
 

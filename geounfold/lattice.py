@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from geounfold.errors import InputError
 from geounfold.mesh import Bools, Floats, Ints
-from geounfold.threads import over_slices
+from geounfold.threads import cores, over_slices
 
 SHARE = 0.97
 """Share of the points that must lie on a lattice for it to count as theirs."""
@@ -164,7 +164,7 @@ def point_spacing(points: Floats) -> float:
     if len(X) > _SAMPLED:
         rank = np.argsort(np.einsum("ij,ij->i", X, X), kind="stable")
         X = X[rank[:: -(-len(X) // (_SAMPLED // 4))]]
-    nearest = np.asarray(tree.query(X, k=min(7, tree.n), workers=-1)[0])
+    nearest = np.asarray(tree.query(X, k=min(7, tree.n), workers=cores())[0])
     return float(np.median(nearest[:, 1:].mean(axis=1)))
 
 

@@ -27,6 +27,7 @@ from scipy.spatial import cKDTree
 from geounfold.control import ControlMesh
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.threads import cores
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -212,7 +213,7 @@ def block_sides(points: Floats) -> Floats:
     if len(known) == 3:
         return known
     sample = points[:: max(1, len(points) // 4000)]
-    nearest = cKDTree(points).query(sample, k=min(7, len(points)), workers=-1)[0]
+    nearest = cKDTree(points).query(sample, k=min(7, len(points)), workers=cores())[0]
     spacing = float(np.median(np.asarray(nearest)[:, 1:].mean(axis=1)))
     return np.full(3, 1.08 * spacing if spacing > 0 else 1.0)  # no slits between turned cubes
 

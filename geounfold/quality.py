@@ -22,7 +22,7 @@ from geounfold.errors import InputError
 from geounfold.geometry import lengths, tet_volumes
 from geounfold.lattice_neighbours import lattice_nmd
 from geounfold.mesh import Floats, Ints
-from geounfold.threads import over_slices, slices
+from geounfold.threads import cores, over_slices, slices
 
 NEIGHBOURS = 26
 """Neighbours per point: those of a block inside a lattice that share a face, edge or corner."""
@@ -131,7 +131,7 @@ def _check_neighbours(count: int, k: int) -> None:
 
 def _nearest(tree: cKDTree, rows: slice | Ints, k: int) -> Ints:
     """Return the k nearest neighbours of some of a tree's points, (m, k)."""
-    found = np.asarray(tree.query(tree.data[rows], k=k + 1, workers=-1)[1], dtype=np.int64)
+    found = np.asarray(tree.query(tree.data[rows], k=k + 1, workers=cores())[1], dtype=np.int64)
     numbers = np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows
     return _without_self(found, numbers)
 
@@ -520,7 +520,7 @@ def torn_blocks(folded: Floats, unfolded: Floats, sides: Floats | None, suspects
         return suspects
     even = folded if sides is None else folded / sides
     count = min(7, len(even))
-    distance, near = cKDTree(even).query(even[suspects], k=count, workers=-1)
+    distance, near = cKDTree(even).query(even[suspects], k=count, workers=cores())
     distance, near = np.asarray(distance)[:, 1:], np.asarray(near, dtype=np.int64)[:, 1:]
     touching = distance <= _TOUCH * distance[:, :1]
     before = np.linalg.norm(folded[near] - folded[suspects, None], axis=2)

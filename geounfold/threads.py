@@ -7,6 +7,7 @@ and no slice knows of the others: what comes out is the same whatever the number
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -14,8 +15,22 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
+def memory_is_limited() -> bool:
+    """Return whether the process may not take all the memory there is (``ulimit -v``)."""
+    if sys.platform == "win32":
+        return False
+    import resource
+
+    return bool(resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY)
+
+
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return how many cores this process may use.
+
+    One where its memory is limited: Python waits for ever for a thread that finds none to start.
+    """
+    if memory_is_limited():
+        return 1
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

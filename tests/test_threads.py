@@ -53,3 +53,21 @@ def test_an_error_in_a_slice_is_raised(monkeypatch):
 
     with pytest.raises(ValueError, match="the third slice"):
         threads.over_slices(work, 10, 2)
+
+
+def test_where_memory_is_limited_there_are_no_threads_to_wait_for():
+    # CPython waits for ever for a thread whose start finds no memory.
+    code = """
+import resource
+from geounfold import threads
+before = threads.memory_is_limited()
+limit = 1 << 40
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+print(before, threads.memory_is_limited(), threads.cores())
+"""
+    if threads.memory_is_limited():
+        pytest.skip("the tests run with limited memory themselves")
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.split() == ["False", "True", "1"]

@@ -17,8 +17,9 @@ from geounfold.cli.console import Console
 from geounfold.cli.journal import Journal
 from geounfold.cli.parser import parse
 from geounfold.cli.stops import STOPS, ignore_stops, stop_of, stoppable
-from geounfold.cli.supervise import memory_is_limited, supervised
+from geounfold.cli.supervise import supervised
 from geounfold.errors import GeounfoldError
+from geounfold.threads import memory_is_limited
 
 _NO_MEMORY = re.compile(
     r"cannot allocate memory|failed to map segment|bad[_ ]alloc|out of memory|unable to allocate"

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-import resource
 import shutil
 import signal
 import sys
@@ -23,6 +22,7 @@ from contextlib import suppress
 from geounfold.cli.console import Console
 from geounfold.cli.journal import Account, Journal
 from geounfold.cli.stops import STOPS, heeded, stoppable
+from geounfold.threads import memory_is_limited
 
 GRACE = 0.5
 """Seconds that a run has to stop by itself."""
@@ -179,11 +179,6 @@ class _Watch:
         how = "ended the run" if number is None else f"crashed ({signal.Signals(number).name})"
         last = noise.strip().splitlines()[-1:]
         return 1, f"a library {how}" + (f": {last[0].strip()}" if last else "")
-
-
-def memory_is_limited() -> bool:
-    """Return whether the process may not take all the memory there is (``ulimit -v``)."""
-    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
 
 
 def _drained(pipe: int) -> bytes:

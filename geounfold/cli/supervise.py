@@ -31,7 +31,7 @@ _MOVING = (
     10.0  # ... and, beyond them, to move outputs in place, which takes no time where disks work
 )
 _ENDING = 5.0  # ... or to leave once all is written
-_TELLING = 0.2  # ... or to say its last line
+_TELLING = 2.0  # ... or to say its last line, on a machine that has no time for it
 _PAUSE = 0.02
 _NOISE = 1 << 16
 _MEMORY = re.compile(r"bad_alloc|alloc|memory", re.IGNORECASE)

@@ -18,6 +18,7 @@ from geounfold.sheet.footprint import Footprint, footprint, principal_direction
 from geounfold.sheet.horizons import Horizons
 from geounfold.sheet.ladder import Rung, climb
 from geounfold.sheet.layers import FINE_FRACTIONS, FRACTIONS, Layers, bounded_slope
+from geounfold.sheet.pin import profile_mean
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
 Flatten = Callable[[TriMesh, Floats | None], Flattening]
@@ -149,28 +150,40 @@ class _FlatSheet:
 
 
 def _flatten_sheet(
-    nodes: _Nodes, prints: Footprint, slip: Floats, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes,
+    prints: Footprint,
+    span: Floats,
+    slip: Floats,
+    reach: tuple[float, float],
+    flatten: Flatten,
 ) -> _FlatSheet:
     """Flatten the mid surface and the parallel surfaces ``reach`` above and below it.
 
-    The fitted ``slip`` (n, 2) per height is the start of the latter two.
+    The fitted ``slip`` (n, 2) per height is the start of the latter two; their mean slip over
+    the ``span`` of the profile is none (see `profile_mean`).
     """
     n = len(prints.U)
     P, normal = nodes.chord_points[:n], nodes.chord_normal[:n]
+    strips = prints.U, prints.weight, prints.axes, prints.cell, span
     middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
     above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid - reach[0] * slip)
     below = flatten(TriMesh(P - reach[1] * normal, prints.F), mid + reach[1] * slip)
-    slopes = tuple(
-        (register(f.uv, mid, prints.weight) - mid) / q
-        for f, q in zip((above, below), reach, strict=True)
-    )
+    slopes = []
+    for f, q in zip((above, below), reach, strict=True):
+        slope = (register(f.uv, mid, prints.weight) - mid) / q
+        slopes.append(slope - profile_mean(slope, *strips))
     flattenings = {"mid": middle, "top": above, "bottom": below}
     return _FlatSheet(mid, (slopes[0], slopes[1]), flattenings)
 
 
 def _safely_flat(
-    nodes: _Nodes, prints: Footprint, slip: Floats, reach: tuple[float, float], flatten: Flatten
+    nodes: _Nodes,
+    prints: Footprint,
+    span: Floats,
+    slip: Floats,
+    reach: tuple[float, float],
+    flatten: Flatten,
 ) -> _FlatSheet:
     """Flatten at the full reach, or nearer to the mid surface where that would fold over.
 
@@ -178,7 +191,7 @@ def _safely_flat(
     """
     for share in (1.0, 0.6, 0.35, 0.2):
         near = (share * reach[0], share * reach[1])
-        result = _flatten_sheet(nodes, prints, slip, near, flatten)
+        result = _flatten_sheet(nodes, prints, span, slip, near, flatten)
         if not result.flips:
             break
     return result
@@ -186,6 +199,8 @@ def _safely_flat(
 
 _OFF = 1e-3  # blocks: rays towards other limbs start so far off the walls
 _HALF = 0.45  # of the way to another limb that a limb may take
+_TIP = 1.5  # blocks before the end of the sheet whose thickness is taken for the tip's
+_FARTHEST = 8.0  # blocks past the last one that a sheet may go on, too thin for blocks
 _STRAIGHT = 1e-9  # curvature below which a surface has no focal distance to speak of
 
 
@@ -281,7 +296,9 @@ def _columns(
     safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
     nodes = _lifted_nodes(sheet, every, prints)
     slip = sheet.grid.value(fitted.slip, every)
-    flat = _safely_flat(nodes, prints, slip[:n], (safe[0], safe[1]), flatten)
+    flat = _safely_flat(
+        nodes, prints, _span(fitted, foot, prints), slip[:n], (safe[0], safe[1]), flatten
+    )
     bottom, top = horizons.crossings(prints.U, slip[:n], limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
     return Columns(
@@ -302,6 +319,30 @@ def _columns(
     )
 
 
+def _span(fitted: FittedSheet, foot: Foot, prints: Footprint) -> Floats:
+    """Return the lowest and the highest station of the mid surface along each axis, (2, 2).
+
+    Those of the blocks within one block of it, before they slipped; and on from there to where
+    a layer that tapers comes to nothing, which is too thin for a block.
+    """
+    near = np.flatnonzero(np.abs(foot.t) < 1)
+    near = near if len(near) else np.arange(len(foot.t))
+    U = foot.U[near]
+    U = U - foot.t[near, None] * fitted.sheet.grid.value(fitted.slip, U)
+    stations = U @ prints.axes.T
+    span = np.empty((2, 2))
+    for k, axis in enumerate(prints.axes):
+        for side, sign in enumerate((-1.0, 1.0)):
+            x = sign * stations[:, k]
+            end = float(x.max())
+            half, hu, hv = fitted.sheet.grid.gradient(fitted.half, U[x > end - _TIP])
+            taper = -sign * float(np.median(hu * axis[0] + hv * axis[1]))
+            left = max(float(np.median(half)) - taper * _TIP / 2, 0.0)
+            on = left / taper if left < 1 and taper > left / _FARTHEST else 0.5
+            span[side, k] = sign * (end + max(on, 0.5))
+    return span
+
+
 def _reach(foot: Foot, options: ControlOptions) -> float:
     """Return the offset that holds every block."""
     return float(np.abs(foot.t[foot.miss < 0.5]).max()) + options.pad
@@ -320,7 +361,7 @@ def build_control(
 
     Prism edges are normals of the mid surface; surfaces parallel to it above and below are
     flattened on their own and registered rigidly to the flat mid surface, which reproduces
-    flexural slip with zero mean slip (the pin line).
+    flexural slip with zero mean slip over the profile (the pin line).
 
     Parameters
     ----------

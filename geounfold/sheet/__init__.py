@@ -63,6 +63,11 @@ class SheetOptions:
     """Options of every stage of the sheet method; lengths in blocks.
 
     ``refused_rough``: the fit's ``rough`` where lattice sites do not agree with a smooth sheet.
+    Before that, and where the half thickness differs by more than ``tapering`` (standard
+    deviation over mean), another fit is tried that keeps the third differences of the half
+    thickness small, to ``taper_half`` instead of ``smooth_half``.  It is taken where it explains
+    ``taper_gain`` times as much of the hull, or, with the fit's ``agree`` raised to
+    ``refused_agree``, where lattice sites agree with it.
     """
 
     medial: MedialOptions = field(default_factory=MedialOptions)
@@ -74,6 +79,10 @@ class SheetOptions:
     control: ControlOptions = field(default_factory=ControlOptions)
     coarse: CoarseOptions = field(default_factory=CoarseOptions)
     refused_rough: float = 1.25
+    refused_agree: float = 0.95
+    tapering: float = 0.1
+    taper_half: float = 4.5
+    taper_gain: float = 1.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,14 +157,15 @@ def fit_body(
     def first(fit: FitOptions) -> FittedSheet:
         return fit_sheet(medial, samples, cells, fit).scaled(unit)
 
-    fitted, sites = first(options.fit), None
+    sites = None
+    fitted, fit = _first(first, options)
     if coarse is not None and fitted.roughness > _TOO_ROUGH * unit:
         raise SplitError(f"cells of {unit} blocks a side are too coarse for the body's bends")
     if exact:
         sharpened, used = "", None
     else:
         sites = None if steps is None else _sites(points, steps, coarse)
-        fitted, sharpened, used = _fitted(fitted, first, points, sites, options)
+        fitted, sharpened, used = _fitted(fitted, fit, first, points, sites, options)
     if coarse is not None and not sharpened:
         raise SplitError(f"a sheet fitted to cells of {unit} blocks a side cannot be sharpened")
     fitted = conform(fitted, medial.scaled(unit), _parameters, options.conform)
@@ -167,6 +177,32 @@ def fit_body(
     if coarse is not None and not mesh.sound:
         raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
     return SheetResult(medial, fitted, horizons, mesh, sharpened)
+
+
+def _first(
+    first: Callable[[FitOptions], FittedSheet], options: SheetOptions
+) -> tuple[FittedSheet, FitOptions]:
+    """Return the sheet fitted to the hull alone, and how: allowing for a taper where it may be."""
+    fitted = first(options.fit)
+    half = fitted.sheet.grid.value(fitted.half, fitted.near)
+    if float(np.std(half)) > options.tapering * float(np.mean(half)):
+        fit = _tapering(options.fit, options)
+        tapered = _tried(first, fit)
+        if tapered is not None and tapered.accepted > options.taper_gain * fitted.accepted:
+            return tapered, fit
+    return fitted, options.fit
+
+
+def _tapering(fit: FitOptions, options: SheetOptions) -> FitOptions:
+    return replace(fit, order_half=3, smooth_half=options.taper_half)
+
+
+def _tried(first: Callable[[FitOptions], FittedSheet], fit: FitOptions) -> FittedSheet | None:
+    """Return another fit than the first; None where no sample agrees with it."""
+    try:
+        return first(fit)
+    except SplitError:
+        return None
 
 
 def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
@@ -184,6 +220,7 @@ def _sites(points: Floats, steps: Floats, coarse: Coarse | None) -> Sites:
 
 def _fitted(
     fitted: FittedSheet,
+    fit: FitOptions,
     first: Callable[[FitOptions], FittedSheet],
     points: Floats,
     sites: Sites | None,
@@ -191,16 +228,19 @@ def _fitted(
 ) -> tuple[FittedSheet, str, Sites | None]:
     """Return the fitted sheet, what sharpened it (see SheetResult), and the sites used.
 
-    ``fitted`` is fitted to the hull alone, as ``first`` does it.
-    Sites that no smooth sheet explains belong to a rougher body: it is fitted again, less
-    smoothly.
+    ``fitted`` is fitted to the hull alone, as ``first`` does it with the options ``fit``.
+    Sites that no smooth sheet explains may be a rim's that was taken for a horizon, or belong to a
+    rougher body: it is fitted again, more choosily, and then less smoothly.
     """
     if sites is None:
         layered = sharpen_layers(fitted, points, options.layers)
         return (fitted, "", None) if layered is None else (layered, "layers", None)
     used = enough_sites(fitted, sites, options.occupancy)
     sharper = sharpen(fitted, used, options.occupancy)
+    if sharper is None and fitted.unit <= 1:
+        choosy = replace(_tapering(fit, options), agree=options.refused_agree)
+        other = _tried(first, choosy)
+        sharper = None if other is None else sharpen(other, used, options.occupancy)
     if sharper is not None:
         return sharper, "sites", used
-    rougher = replace(options.fit, rough=options.refused_rough)
-    return first(rougher), "", used
+    return first(replace(fit, rough=options.refused_rough)), "", used

@@ -29,11 +29,12 @@ class FitOptions:
     ``knots``: spline knot spacing; ``cell``: spacing of the searched sampling; ``smooth``:
     length below which the mid surface is smoothed, on smooth hulls and (times ``rough``)
     on staircases, by residuals between ``quiet`` and ``loud``; ``smooth_half``: the same for
-    the half thickness; ``weak``: weight of medial points off the core; ``unseen``: weight of
-    curvature, felt where no sample tells it, across a narrow strip; ``rounds``: growth rounds;
-    ``agree``: least cosine between a sample's normal and the predicted one;
-    ``first``/``later``: largest thickness misfit of an accepted sample in round one and
-    after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
+    the half thickness, and ``order_half`` the order of its differences that are kept small: 2,
+    or 3 where it may taper all the way; ``weak``: weight of medial points off the core;
+    ``unseen``: weight of curvature, felt where no sample tells it, across a narrow strip;
+    ``rounds``: growth rounds; ``agree``: least cosine between a sample's normal and the
+    predicted one; ``first``/``later``: largest thickness misfit of an accepted sample in round
+    one and after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
     accepted samples the sheet is searched.
     """
 
@@ -44,6 +45,7 @@ class FitOptions:
     quiet: float = 0.03
     loud: float = 0.08
     smooth_half: float = 3.0
+    order_half: int = 2
     weak: float = 1e-4
     unseen: float = 3e-4
     rounds: int = 4
@@ -165,7 +167,7 @@ class _System:
     grid: SplineGrid
     bending: Stencils
     third: Stencils
-    half_weight: float
+    even_half: Stencils
     unseen: float
 
     def stiffness(self, length: float) -> Stencils:
@@ -180,13 +182,18 @@ def _start(
     margin = float(np.max(cKDTree(medial.mesh.V).query(points)[0])) + 3
     low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
     grid = SplineGrid.over(low, high, options.knots)
-    half_weight = (options.smooth_half / options.knots) ** 4
-    system = _System(grid, grid.energy(2), grid.energy(3), half_weight, options.unseen)
+    bending = grid.energy(2)
+    even_half = (options.smooth_half / options.knots) ** (2 * options.order_half) * (
+        grid.energy(options.order_half)
+    )
+    if options.order_half > 2:  # steady slopes are free then, and unlimited past the samples
+        even_half = even_half + options.unseen * bending
+    system = _System(grid, bending, grid.energy(3), even_half, options.unseen)
     w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
     B = grid.basis(medial.uv)
     BtWB = grid.gram(B, w)
     C = (BtWB + system.stiffness(options.smooth)).solver(RIDGE)(B.T @ (w[:, None] * medial.mesh.V))
-    half = (BtWB + half_weight * system.bending).solver(RIDGE)(B.T @ (w * medial.half))
+    half = (BtWB + even_half).solver(RIDGE)(B.T @ (w * medial.half))
     return system, Sheet(grid, C, low, high, options.cell), half
 
 
@@ -266,7 +273,7 @@ def _refit(
     B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
     BtWB = system.grid.gram(B, w)
     surface = BtWB + system.stiffness(smoothing)
-    thickness = system.grid.gram(H, w) + system.half_weight * system.bending
+    thickness = system.grid.gram(H, w) + system.even_half
     cross = B.T @ H.multiply((w * s)[:, None]).tocsr()
     solve = coupled_solver(surface, thickness, cross, RIDGE)
     z = solve(np.concatenate([B.T @ (w * t), H.T @ (w * s * t)]))

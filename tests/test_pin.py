@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import geounfold as gu
-from geounfold.sheet.pin import profile_mean
+from geounfold.sheet.pin import Profile
 
 RNG = np.random.default_rng(3)
 STRAIGHT = np.eye(2)
@@ -30,7 +30,7 @@ def test_every_station_counts_once(angle):
     U = points(widening)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     span = np.array([[0.0, -20.0], [60.0, 20.0]])
-    found = profile_mean(slips(U) @ turn, U @ turn, np.ones(len(U)), turn, 1.5, span)
+    found = Profile(turn, span).mean(slips(U) @ turn, U @ turn, np.ones(len(U)), 1.5)
     # The mean over the area is 0.5 + 60 / (12 * 46) = 0.61.  A strip's mean lies within its
     # 1.5 / 60 of the profile, evenly on both sides: 40 strips leave a tenth of that.
     assert slips(U).mean(axis=0)[0] == pytest.approx(0.61, abs=0.01)
@@ -41,7 +41,7 @@ def test_stations_without_points_are_bridged():
     U = points(widening)
     U = U[(U[:, 0] < 35) | (U[:, 0] > 50)]
     span = np.array([[0.0, -20.0], [60.0, 20.0]])
-    found = profile_mean(slips(U), U, np.ones(len(U)), STRAIGHT, 1.5, span)
+    found = Profile(STRAIGHT, span).mean(slips(U), U, np.ones(len(U)), 1.5)
     # Without the gap's stations the mean would be (30 - 15 * 42.5 / 60) / 45 = 0.43.
     assert found[0] == pytest.approx(0.5, abs=0.004)
 
@@ -50,7 +50,7 @@ def test_one_station_is_its_own_mean():
     U = np.array([[3.0, 1.0], [3.0, 1.0]])
     values = np.array([[1.0, 2.0], [3.0, 2.0]])
     span = np.array([[2.5, 0.5], [3.5, 1.5]])
-    found = profile_mean(values, U, np.array([1.0, 3.0]), STRAIGHT, 1.5, span)
+    found = Profile(STRAIGHT, span).mean(values, U, np.array([1.0, 3.0]), 1.5)
     assert found == pytest.approx([2.5, 2.0])  # (1 + 3 * 3) / 4, and 2
 
 

@@ -82,7 +82,7 @@ class SheetOptions:
     refused_agree: float = 0.95
     tapering: float = 0.1
     taper_half: float = 4.5
-    taper_gain: float = 1.15
+    taper_gain: float = 1.4
 
 
 @dataclass(frozen=True, eq=False)

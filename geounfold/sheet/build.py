@@ -18,7 +18,7 @@ from geounfold.sheet.footprint import Footprint, footprint, principal_direction
 from geounfold.sheet.horizons import Horizons
 from geounfold.sheet.ladder import Rung, climb
 from geounfold.sheet.layers import FINE_FRACTIONS, FRACTIONS, Layers, bounded_slope
-from geounfold.sheet.pin import profile_mean
+from geounfold.sheet.pin import Profile, fold_axes
 from geounfold.sheet.surface import Foot, Sheet, normals, principal_curvatures
 
 Flatten = Callable[[TriMesh, Floats | None], Flattening]
@@ -152,7 +152,7 @@ class _FlatSheet:
 def _flatten_sheet(
     nodes: _Nodes,
     prints: Footprint,
-    span: Floats,
+    profile: Profile,
     slip: Floats,
     reach: tuple[float, float],
     flatten: Flatten,
@@ -160,11 +160,10 @@ def _flatten_sheet(
     """Flatten the mid surface and the parallel surfaces ``reach`` above and below it.
 
     The fitted ``slip`` (n, 2) per height is the start of the latter two; their mean slip over
-    the ``span`` of the profile is none (see `profile_mean`).
+    the ``profile`` is none.
     """
     n = len(prints.U)
     P, normal = nodes.chord_points[:n], nodes.chord_normal[:n]
-    strips = prints.U, prints.weight, prints.axes, prints.cell, span
     middle = flatten(TriMesh(P, prints.F), prints.U)
     mid = register(middle.uv, prints.U, prints.weight)
     above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid - reach[0] * slip)
@@ -172,7 +171,7 @@ def _flatten_sheet(
     slopes = []
     for f, q in zip((above, below), reach, strict=True):
         slope = (register(f.uv, mid, prints.weight) - mid) / q
-        slopes.append(slope - profile_mean(slope, *strips))
+        slopes.append(slope - profile.mean(slope, prints.U, prints.weight, prints.cell))
     flattenings = {"mid": middle, "top": above, "bottom": below}
     return _FlatSheet(mid, (slopes[0], slopes[1]), flattenings)
 
@@ -180,7 +179,7 @@ def _flatten_sheet(
 def _safely_flat(
     nodes: _Nodes,
     prints: Footprint,
-    span: Floats,
+    profile: Profile,
     slip: Floats,
     reach: tuple[float, float],
     flatten: Flatten,
@@ -191,7 +190,7 @@ def _safely_flat(
     """
     for share in (1.0, 0.6, 0.35, 0.2):
         near = (share * reach[0], share * reach[1])
-        result = _flatten_sheet(nodes, prints, span, slip, near, flatten)
+        result = _flatten_sheet(nodes, prints, profile, slip, near, flatten)
         if not result.flips:
             break
     return result
@@ -297,7 +296,7 @@ def _columns(
     nodes = _lifted_nodes(sheet, every, prints)
     slip = sheet.grid.value(fitted.slip, every)
     flat = _safely_flat(
-        nodes, prints, _span(fitted, foot, prints), slip[:n], (safe[0], safe[1]), flatten
+        nodes, prints, _profile(fitted, foot), slip[:n], (safe[0], safe[1]), flatten
     )
     bottom, top = horizons.crossings(prints.U, slip[:n], limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
@@ -319,19 +318,20 @@ def _columns(
     )
 
 
-def _span(fitted: FittedSheet, foot: Foot, prints: Footprint) -> Floats:
-    """Return the lowest and the highest station of the mid surface along each axis, (2, 2).
+def _profile(fitted: FittedSheet, foot: Foot) -> Profile:
+    """Return the sections of the mid surface.
 
-    Those of the blocks within one block of it, before they slipped; and on from there to where
-    a layer that tapers comes to nothing, which is too thin for a block.
+    They reach as far as the blocks within one block of it did before they slipped; and on from
+    there to where a layer that tapers comes to nothing, which is too thin for a block.
     """
+    axes = fold_axes(fitted.sheet, foot.U)
     near = np.flatnonzero(np.abs(foot.t) < 1)
     near = near if len(near) else np.arange(len(foot.t))
     U = foot.U[near]
     U = U - foot.t[near, None] * fitted.sheet.grid.value(fitted.slip, U)
-    stations = U @ prints.axes.T
+    stations = U @ axes.T
     span = np.empty((2, 2))
-    for k, axis in enumerate(prints.axes):
+    for k, axis in enumerate(axes):
         for side, sign in enumerate((-1.0, 1.0)):
             x = sign * stations[:, k]
             end = float(x.max())
@@ -340,7 +340,7 @@ def _span(fitted: FittedSheet, foot: Foot, prints: Footprint) -> Floats:
             left = max(float(np.median(half)) - taper * _TIP / 2, 0.0)
             on = left / taper if left < 1 and taper > left / _FARTHEST else 0.5
             span[side, k] = sign * (end + max(on, 0.5))
-    return span
+    return Profile(axes, span)
 
 
 def _reach(foot: Foot, options: ControlOptions) -> float:

@@ -99,13 +99,11 @@ class Footprint:
 
 
 def principal_direction(sheet: Sheet, U: Floats) -> float:
-    """Return the direction of the largest squared curvature, summed over U (n, 2), radians.
-
-    The first axis of the second form squared: crests and troughs count alike.
-    """
+    """Return the mean direction of principal curvature over U (n, 2), radians."""
     jet = sheet.jet(U)
     L, M, N = second_form(jet, normals(jet))
-    return 0.5 * float(np.arctan2(((L + N) * 2 * M).sum(), ((L + N) * (L - N)).sum()))
+    size = np.hypot(L - N, 2 * M)
+    return 0.5 * float(np.arctan2((2 * M * size).sum(), ((L - N) * size).sum()))
 
 
 def _triangles(cells: Bools) -> Ints:

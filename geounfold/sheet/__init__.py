@@ -67,7 +67,8 @@ class SheetOptions:
     deviation over mean), another fit is tried that keeps the third differences of the half
     thickness small, to ``taper_half`` instead of ``smooth_half``.  It is taken where it explains
     ``taper_gain`` times as much of the hull, or, with the fit's ``agree`` raised to
-    ``refused_agree``, where lattice sites agree with it.
+    ``refused_agree``, where it explains ``refused_share`` of the hull and lattice sites agree
+    with it.
     """
 
     medial: MedialOptions = field(default_factory=MedialOptions)
@@ -80,6 +81,7 @@ class SheetOptions:
     coarse: CoarseOptions = field(default_factory=CoarseOptions)
     refused_rough: float = 1.25
     refused_agree: float = 0.95
+    refused_share: float = 0.4
     tapering: float = 0.1
     taper_half: float = 4.5
     taper_gain: float = 1.4
@@ -240,7 +242,8 @@ def _fitted(
     if sharper is None and fitted.unit <= 1:
         choosy = replace(_tapering(fit, options), agree=options.refused_agree)
         other = _tried(first, choosy)
-        sharper = None if other is None else sharpen(other, used, options.occupancy)
+        if other is not None and other.accepted > options.refused_share:
+            sharper = sharpen(other, used, options.occupancy)
     if sharper is not None:
         return sharper, "sites", used
     return first(replace(fit, rough=options.refused_rough)), "", used

@@ -1,12 +1,20 @@
 """Lattice sites and layers: what they say, and that a sheet listens."""
 
+from dataclasses import asdict
 from itertools import product
 
 import numpy as np
 import pytest
 
 import geounfold as gu
-from geounfold.sheet import ConformOptions, LayerOptions, OccupancyOptions, SheetOptions
+from geounfold.sheet import (
+    CloserFitOptions,
+    ConformOptions,
+    FitOptions,
+    LayerOptions,
+    OccupancyOptions,
+    SheetOptions,
+)
 from geounfold.sheet.displace import displacement_basis, node_normals
 from geounfold.sheet.layered import layer_heights, scatter, sharpen_layers
 from geounfold.sheet.occupancy import sharpen
@@ -78,7 +86,8 @@ def test_scatter_is_even():
 def lattice_fit():
     """A lattice body, its truth and its sheet before and after."""
     body = simulate("plunging", blocks=12000)
-    never = SheetOptions(occupancy=OccupancyOptions(misfit=-1.0))
+    once = CloserFitOptions(**asdict(FitOptions()))  # fitted again as at first
+    never = SheetOptions(occupancy=OccupancyOptions(misfit=-1.0), closer=once)
     return body, gu.unfold(body.folded, sheet_options=never), gu.unfold(body.folded)
 
 
@@ -97,9 +106,9 @@ def test_sites_that_no_sheet_separates_are_refused(lattice_fit):
     points = after.frame.snap(after.frame.to_work(after.folded))
     steps = after.frame.steps
     sites = surface_sites(np.rint(points / steps).astype(np.int64), steps)
-    assert sharpen(fitted, sites, OccupancyOptions()) is not None
+    assert sharpen(fitted, sites, OccupancyOptions()).sheet is not None
     mixed = type(sites)(sites.points, RNG.permutation(sites.occupied))
-    assert sharpen(fitted, mixed, OccupancyOptions()) is None
+    assert sharpen(fitted, mixed, OccupancyOptions()).sheet is None
 
 
 def test_layers_bring_a_folded_grid_nearer_to_the_truth():

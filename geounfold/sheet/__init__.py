@@ -15,7 +15,7 @@ from geounfold.geometry import vertex_sum
 from geounfold.mesh import Floats, TriMesh
 from geounfold.sheet.build import ControlOptions, Flatten, SheetMesh, build_control
 from geounfold.sheet.conform import ConformOptions, conform
-from geounfold.sheet.fit import FitOptions, FittedSheet, Samples, fit_sheet
+from geounfold.sheet.fit import CloserFitOptions, FitOptions, FittedSheet, Samples, fit_sheet
 from geounfold.sheet.horizons import (
     HorizonOptions,
     Horizons,
@@ -29,6 +29,7 @@ from geounfold.sheet.sites import Sites, surface_sites
 from geounfold.split import SurfaceSplit
 
 __all__ = [
+    "CloserFitOptions",
     "CoarseOptions",
     "ConformOptions",
     "ControlOptions",
@@ -58,6 +59,13 @@ Measured: 0.03 to 0.08 where the sheet could be sharpened, 0.28 where it could n
 """
 
 
+_CLEARLY = 0.7
+"""Share of the sites' mean depth that a closer fit may leave where none separates them.
+
+Measured: 0.05 to 0.5 where the first fit had lost a limb, 0.9 to 1.6 where the closer one did.
+"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
     """Options of every stage of the sheet method; lengths in blocks.
@@ -68,7 +76,9 @@ class SheetOptions:
     thickness small, to ``taper_half`` instead of ``smooth_half``.  It is taken where it explains
     ``taper_gain`` times as much of the hull, or, with the fit's ``agree`` raised to
     ``refused_agree``, where it explains ``refused_share`` of the hull and lattice sites agree
-    with it.
+    with it.  ``closer``: how the sheet is fitted where they agree with neither, or, of points on
+    no lattice, where they lie ``left_out`` blocks and more beyond it on average; ``sheared``:
+    see OccupancyOptions, of the sheet so fitted.
     """
 
     medial: MedialOptions = field(default_factory=MedialOptions)
@@ -79,6 +89,9 @@ class SheetOptions:
     conform: ConformOptions = field(default_factory=ConformOptions)
     control: ControlOptions = field(default_factory=ControlOptions)
     coarse: CoarseOptions = field(default_factory=CoarseOptions)
+    closer: CloserFitOptions = field(default_factory=CloserFitOptions)
+    left_out: float = 0.01
+    sheared: float = 1.0
     refused_rough: float = 1.25
     refused_agree: float = 0.95
     refused_share: float = 0.4
@@ -172,7 +185,7 @@ def fit_body(
         raise SplitError(f"a sheet fitted to cells of {unit} blocks a side cannot be sharpened")
     fitted = conform(fitted, medial.scaled(unit), _parameters, options.conform)
     hull = fitted.scaled(1 / unit)
-    horizons = fit_horizons(hull, samples, options.fit.knots, options.horizons).scaled(unit)
+    horizons = fit_horizons(hull, samples, hull.sheet.grid.step, options.horizons).scaled(unit)
     if used is not None and sharpened:
         horizons = separate_horizons(fitted, horizons, used, options.horizons, options.occupancy)
     mesh = build_control(fitted, horizons, points, blocks, flatten, options.control, datum)
@@ -231,19 +244,50 @@ def _fitted(
     """Return the fitted sheet, what sharpened it (see SheetResult), and the sites used.
 
     ``fitted`` is fitted to the hull alone, as ``first`` does it with the options ``fit``.
-    Sites that no smooth sheet explains may be a rim's that was taken for a horizon, or belong to a
-    rougher body: it is fitted again, more choosily, and then less smoothly.
+    Where sites or points contradict it, it is fitted again: more choosily, as a rim may have been
+    taken for a horizon, then more closely.  Sites that contradict all of these belong to a rougher
+    body; of the closer fit and a rougher one that is taken which they contradict less, or which
+    leaves less of the blocks out.
     """
     if sites is None:
         layered = sharpen_layers(fitted, points, options.layers)
-        return (fitted, "", None) if layered is None else (layered, "layers", None)
+        if layered is not None:
+            return layered, "layers", None
+        return _holding(fitted, first, points, options), "", None
     used = enough_sites(fitted, sites, options.occupancy)
-    sharper = sharpen(fitted, used, options.occupancy)
-    if sharper is None and fitted.unit <= 1:
+    once = sharpen(fitted, used, options.occupancy)
+    if once.sheet is not None:
+        return once.sheet, "sites", used
+    if fitted.unit <= 1:
         choosy = replace(_tapering(fit, options), agree=options.refused_agree)
         other = _tried(first, choosy)
         if other is not None and other.accepted > options.refused_share:
-            sharper = sharpen(other, used, options.occupancy)
-    if sharper is not None:
-        return sharper, "sites", used
-    return first(replace(fit, rough=options.refused_rough)), "", used
+            again = sharpen(other, used, options.occupancy)
+            if again.sheet is not None:
+                return again.sheet, "sites", used
+    closer = _tried(first, options.closer)
+    if closer is not None:
+        others = enough_sites(closer, sites, options.occupancy)
+        again = sharpen(closer, others, replace(options.occupancy, sheared=options.sheared))
+        if again.sheet is not None:
+            return again.sheet, "sites", others
+    rougher = first(replace(fit, rough=options.refused_rough))
+    if closer is None or again.depth > _CLEARLY * once.depth:
+        return rougher, "", used
+    if closer.left_out(points) >= rougher.left_out(points):
+        return rougher, "", used
+    return closer, "", others
+
+
+def _holding(
+    fitted: FittedSheet,
+    first: Callable[[FitOptions], FittedSheet],
+    points: Floats,
+    options: SheetOptions,
+) -> FittedSheet:
+    """Return the sheet, or one fitted more closely where that leaves out half as much or less."""
+    over = fitted.left_out(points)
+    if over < options.left_out * fitted.unit:
+        return fitted
+    closer = _tried(first, options.closer)
+    return fitted if closer is None or closer.left_out(points) > over / 2 else closer

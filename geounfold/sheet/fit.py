@@ -35,7 +35,8 @@ class FitOptions:
     ``rounds``: growth rounds; ``agree``: least cosine between a sample's normal and the
     predicted one; ``first``/``later``: largest thickness misfit of an accepted sample in round
     one and after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
-    accepted samples the sheet is searched.
+    accepted samples the sheet is searched; ``ahead``: samples whose feet lie farther than this
+    from the last round's accepted ones are left for later rounds.
     """
 
     knots: float = 3.5
@@ -54,6 +55,25 @@ class FitOptions:
     later: float = 1.0
     erosion: float = 1.5
     reach: float = 4.0
+    ahead: float = np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloserFitOptions(FitOptions):
+    """The same where the first fit does not hold: closer to the samples, grown step by step.
+
+    A hinge of few blocks' radius is flattened by the smoothing that evens out staircases.  The
+    sheet then runs straight on where the body bends, rejects what lies there, and keeps away
+    from it; so it never reaches the body's ends, which in overturned folds are long wedges.
+    """
+
+    smooth: float = 1.0
+    rough: float = 1.0
+    unseen: float = 1e-4
+    rounds: int = 8
+    later: float = 0.7
+    erosion: float = 0.75
+    ahead: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +175,18 @@ class FittedSheet:
                 mine[rows[better]] = theirs[better]
         return foot
 
+    def left_out(self, points: Floats) -> float:
+        """Return how far the points (n, 3) of the body lie beyond its horizons, on average.
+
+        At most three blocks each, which also stand for a point without a foot.  About 0.001
+        blocks where the sheet holds the body, 0.1 and more where it lost a limb.
+        """
+        foot = self.own_feet(points, tuple(r * self.unit for r in (2.0, 5.0, 10.0)))
+        grid, most = self.sheet.grid, 3.0 * self.unit
+        flat = foot.U - foot.t[:, None] * grid.value(self.slip, foot.U)
+        over = np.clip(np.abs(foot.t) - grid.value(self.half, flat), 0.0, most)
+        return float(np.where(foot.miss > 0.1 * self.unit, most, over).mean())
+
     def reach(self, side: float, half: Floats) -> Floats:
         """Return the distance from the sheet to its top (side 1) or bottom (-1), (n,)."""
         return half - side * self.lean * (half - self.level)
@@ -223,10 +255,12 @@ def _accept(
     foot: Foot,
     samples: Samples,
     misfit: float,
+    near: Floats,
     options: FitOptions,
 ) -> _Accepted:
     """Return which samples agree with the sheet so far, by normal and by thickness.
 
+    Those far from the parameters ``near`` (k, 2) say nothing yet, for or against.
     The distance kept from those that do not is reduced where it would cost most of a strip.
     """
     side = np.sign(np.einsum("ij,ij->i", samples.normals, foot.normal))
@@ -239,6 +273,8 @@ def _accept(
     good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
     good &= side * samples.side >= 0  # else the sheet has run into another limb
     true_foot = foot.miss < 0.1
+    if np.isfinite(options.ahead):
+        true_foot &= cKDTree(near).query(foot.U)[0] < options.ahead
     good &= true_foot
     wrong = ~good & true_foot
     for erosion in (options.erosion, options.erosion / 2, 0.0):
@@ -315,7 +351,7 @@ def fit_sheet(
     for turn in range(options.rounds):
         foot = sheet.search(near, options.reach).feet(samples.points)
         misfit = options.first if turn == 0 else options.later
-        accepted = _accept(sheet, half, slip, foot, samples, misfit, options)
+        accepted = _accept(sheet, half, slip, foot, samples, misfit, near, options)
         if not accepted.keep.any():
             raise SplitError(
                 "no part of the hull agrees with a smooth sheet; try another --hull, or smaller "

@@ -50,7 +50,9 @@ class OccupancyOptions:
     sites past those limits are followed all the same, as the sheet moves; ``misfit``: mean
     depth on the wrong side above which the first fit is kept; ``enough``: sites per coefficient
     of the sheet up to which all are used, where blocks were merged; ``held``: whether steps are
-    limited past the rim as well, where the sheet is but continued.
+    limited past the rim as well, where the sheet is but continued; ``sheared``: share of the
+    slip by which the distance from the rim grows, as slip spreads the rim's sites along the
+    unfolded layer.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -71,6 +73,7 @@ class OccupancyOptions:
     misfit: float = 0.01
     enough: int = 100
     held: bool = True
+    sheared: float = 0.0
 
     def for_cells(self, side: float) -> OccupancyOptions:
         """Return the options for a sheet fitted to cells of merged blocks of some side.
@@ -98,6 +101,17 @@ class _Views:
 
 
 @dataclass(frozen=True, eq=False)
+class Separation:
+    """A sheet moved to separate the sites, or None where no smooth one does.
+
+    ``depth``: mean depth of the used sites on the wrong side, blocks; inf where none was used.
+    """
+
+    sheet: FittedSheet | None
+    depth: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Round:
     """What one round made: sheet, half thickness, and how many sites are on the wrong side."""
 
@@ -107,11 +121,11 @@ class _Round:
     depth: float
 
 
-def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> FittedSheet | None:
+def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Separation:
     """Return the sheet sharpened by lattice sites.
 
-    None where no smooth pair of surfaces separates the sites: their mean depth on the wrong
-    side is above ``misfit``.
+    It is none where no smooth pair of surfaces separates the sites: their mean depth on the
+    wrong side is above ``misfit``.
 
     Parameters
     ----------
@@ -133,7 +147,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
         places.follow(sheet, (half, half), fitted.slip, steps=1 if k else 0)
         use = places.explained(margin, depth, options)
         if not len(use):
-            return None
+            return Separation(None, np.inf)
         nodes = node_normals(sheet)
         views = _views(sheet, nodes, places, use)
         last = _step(
@@ -149,16 +163,19 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Fit
             options.held,
         )
         sheet, half, used = last.sheet, last.half, places.U[use]
-        if not np.isfinite(sheet.C).all() or (k and not options.held and last.depth > _HOPELESS):
-            return None
+        if not np.isfinite(sheet.C).all():
+            return Separation(None, np.inf)
+        if k and not options.held and last.depth > _HOPELESS:
+            return Separation(None, last.depth)
         places.watch(margin, options)
         if margin <= options.adapt and last.wrong > options.tolerated:
             smooth = max(smooth / options.pace, options.least)
     if last is None or last.depth > options.misfit:
-        return None
+        return Separation(None, np.inf if last is None else last.depth)
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))
-    return replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
+    sharper = replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
+    return Separation(sharper, last.depth)
 
 
 def enough_sites(fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Sites:
@@ -209,9 +226,9 @@ class Places:
     """Where the sites lie in the sheet's coordinates; those watched are followed as it moves.
 
     ``farther`` (n,): seen from the farther horizon, not the nearer; ``U`` (n, 2) feet, ``t``
-    (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded parameters; ``half`` (n,) half
-    thickness, ``taper`` (n,) its slope and ``middle`` (n,) offset half-way between the horizons
-    there; ``watched`` (w,) rows.
+    (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded parameters, ``slope`` (n,) slip per
+    height; ``half`` (n,) half thickness, ``taper`` (n,) its slope and ``middle`` (n,) offset
+    half-way between the horizons there; ``watched`` (w,) rows.
     """
 
     sites: Sites
@@ -224,6 +241,7 @@ class Places:
     taper: Floats
     middle: Floats
     watched: Ints
+    slope: Floats
 
     @classmethod
     def of(cls, fitted: FittedSheet, sites: Sites, options: OccupancyOptions) -> Places:
@@ -242,7 +260,8 @@ class Places:
         t, half, taper, middle = (np.empty(n) for _ in range(4))
         normal, flat, U = np.empty((n, 3)), np.empty((n, 2)), foot.U[rows]
         chosen = Sites(sites.points[rows], sites.occupied[rows])
-        return cls(chosen, farther, U, t, normal, flat, half, taper, middle, np.arange(n))
+        watched, slope = np.arange(n), np.zeros(n)
+        return cls(chosen, farther, U, t, normal, flat, half, taper, middle, watched, slope)
 
     @property
     def side(self) -> Floats:
@@ -264,7 +283,9 @@ class Places:
         """Find the watched sites' places anew; ``reach``: coefficients up to top and bottom."""
         rows, grid = self.watched, sheet.grid
         foot = follow_feet(sheet, self.sites.points[rows], self.U[rows], steps)
-        flat = foot.U - foot.t[:, None] * grid.value(slip, foot.U)
+        shear = grid.value(slip, foot.U)
+        flat = foot.U - foot.t[:, None] * shear
+        self.slope[rows] = np.linalg.norm(shear, axis=1)
         self.U[rows], self.t[rows], self.normal[rows] = foot.U, foot.t, foot.normal
         self.flat[rows] = flat
         self.level(sheet.grid, reach)
@@ -294,8 +315,10 @@ class Places:
         good = (self.right < clearance(margin)) & (np.abs(beyond) < max(options.band, 4 * margin))
         good &= (thickness > options.thinnest) & (self.taper < options.taper)
         use = np.flatnonzero(good)
-        rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=options.rim)[0]
-        out: Ints = use[rim > options.rim]
+        wide = options.rim * np.hypot(1.0, options.sheared * self.slope[use])
+        most = float(wide.max(initial=options.rim))
+        rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=most)[0]
+        out: Ints = use[rim > wide]
         return out
 
     def holes(self, depth: float, options: OccupancyOptions) -> Bools:

@@ -46,7 +46,7 @@ LOOKS_BACK = 0.85  # faces of a pair of sides are opposite when smoothed -N.N' e
 PAIRS = 3  # largest pairs of opposite sides that are compared: top, flanks, ends
 SPECK = 30  # faces: what a ridge surrounds is a roughness, not another side
 SWEEPS = 12  # bilateral sweeps that smooth the normals
-FLAT = 0.99  # a side is plane when its smoothed normals' mean is longer than this
+PLANE = 0.07  # thicknesses off its plane, rms, up to which a side is plane
 BENT_ADVANTAGE = 8.0  # a bent pair of sides is preferred to a plane one of up to this the extent
 COARSE_ABOVE = 12_000  # faces above which the graph is contracted before it is solved
 COARSENINGS = 2  # rounds of contraction, each to about 40 % of the nodes
@@ -275,14 +275,24 @@ def _pair(rank: Ints, k: int, faces: _Faces, L: sp.csc_array) -> _Pair:
     alone = sp.coo_array((np.concatenate([degree, value]), at), (len(rows), len(rows)))
     side = _signs(_lowest_vector(alone.tocsc())) if len(rows) > 2 else np.ones(len(rows), int)
     thickness = float(np.median(faces.distance[rows]))
-    areas, means = [], []
-    for s in (1, -1):
-        mine = rows[side == s]
-        areas.append(float(faces.area[mine].sum()))
-        means.append(float(np.linalg.norm(faces.area[mine] @ faces.smoothed[mine])))
-    flat = all(mean > FLAT * area for mean, area in zip(means, areas, strict=True))
+    sides = [rows[side == s] for s in (1, -1)]
+    areas = [float(faces.area[mine].sum()) for mine in sides]
+    flat = all(_off_plane(faces, mine) <= PLANE * thickness for mine in sides)
     others = ((rank >= 0) & (rank != k)) | _parted(faces, rows)
     return _Pair(rows, side, thickness, min(areas) / thickness**2, flat, others)
+
+
+def _off_plane(faces: _Faces, rows: Ints) -> float:
+    """Return the rms distance of faces from the plane that fits them best.
+
+    Unlike their normals it hardly knows the staircase of blocks, a tenth of a block high.
+    """
+    area = faces.area[rows]
+    if not len(rows):
+        return 0.0
+    apart = faces.centre[rows] - area @ faces.centre[rows] / area.sum()
+    least = np.linalg.eigvalsh((apart * area[:, None]).T @ apart / area.sum())[0]
+    return float(np.sqrt(max(least, 0.0)))
 
 
 def _parted(faces: _Faces, rows: Ints) -> Bools:

@@ -90,7 +90,7 @@ class SheetOptions:
     control: ControlOptions = field(default_factory=ControlOptions)
     coarse: CoarseOptions = field(default_factory=CoarseOptions)
     closer: CloserFitOptions = field(default_factory=CloserFitOptions)
-    left_out: float = 0.01
+    left_out: float = 0.008
     sheared: float = 1.0
     refused_rough: float = 1.25
     refused_agree: float = 0.95
@@ -265,7 +265,8 @@ def _fitted(
             again = sharpen(other, used, options.occupancy)
             if again.sheet is not None:
                 return again.sheet, "sites", used
-    closer = _tried(first, options.closer)
+    contradicted = np.isfinite(once.depth)  # else no site said anything
+    closer = _tried(first, options.closer) if contradicted else None
     if closer is not None:
         others = enough_sites(closer, sites, options.occupancy)
         again = sharpen(closer, others, replace(options.occupancy, sheared=options.sheared))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.ndimage as ndi
-from scipy.spatial import cKDTree
 
+from geounfold.errors import ControlMeshError
 from geounfold.mesh import Bools, Floats, Ints
 from geounfold.sheet.surface import Sheet, normals, second_form
 
@@ -143,28 +143,6 @@ def _widened(cells: Bools, rings: int) -> Bools:
         out = out | fill
 
 
-def _joined(cells: Bools) -> Bools:
-    """Return cells with bridges, three wide, between parts that do not touch: a sheet is one.
-
-    The smaller part is joined to the cell nearest to it, until one part is left.
-    """
-    out = cells
-    while True:
-        label, parts = ndi.label(out)
-        if int(parts) < 2:
-            return out
-        sizes = np.bincount(label.ravel())[1:]
-        own = label == 1 + int(np.argmin(sizes))
-        here, there = np.argwhere(own), np.argwhere(out & ~own)
-        away, nearest = (np.asarray(found) for found in cKDTree(there).query(here))
-        k = int(np.argmin(away))
-        count = 2 * int(np.ceil(away[k])) + 1  # half a cell a step: no cell is left out
-        line = here[k] + np.linspace(0.0, 1.0, count)[:, None] * (there[nearest[k]] - here[k])
-        bridge = np.zeros_like(out)
-        bridge[tuple(np.rint(line).astype(np.int64).T)] = True
-        out = _widened(out | ndi.binary_dilation(bridge, _SQUARE), 0)
-
-
 def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 0) -> Footprint:
     """Return the footprint of feet U (b, 2) on a square grid turned by an angle.
 
@@ -177,9 +155,14 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 
     cell : float
         Side of the cells.
     dilation : int
-        Rings of cells added around those that hold feet; parts left apart are joined by bridges.
+        Rings of cells added around those that hold feet.
     rings : int
         Rings of cells around all of these, kept apart (see Ring).
+
+    Raises
+    ------
+    ControlMeshError
+        Cells that are not one part.
     """
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     V = U @ turn
@@ -189,7 +172,14 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 
     at = np.floor((V - low) / cell).astype(np.int64)
     count = np.bincount(at[:, 0] * shape[1] + at[:, 1], minlength=shape.prod()).reshape(shape)
     held = count > 0
-    cells = _joined(_widened(held, dilation))
+    cells = _widened(held, dilation)
+    parts = int(np.max(ndi.label(cells)[0]))
+    if parts > 1:
+        raise ControlMeshError(
+            f"the blocks lie on the fitted mid surface in {parts} parts that do not touch: bodies "
+            "of their own, or one too ragged or narrow for its thickness; unfold them one by one, "
+            "or try another --hull"
+        )
     node, F = np.unique(_triangles(cells), return_inverse=True)
     capped = np.pad(np.minimum(count, np.median(count[held])).astype(float), 1)
     around = capped[:-1, :-1] + capped[1:, :-1] + capped[:-1, 1:] + capped[1:, 1:]

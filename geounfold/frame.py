@@ -195,13 +195,13 @@ def axis_angle_rotation(from_vec: Floats, to_vec: Floats) -> Floats:
     """
     a, b = _direction(from_vec), _direction(to_vec)
     if a @ b >= 0:
-        return _smallturned(a, b)
+        return _small_turn(a, b)
     axis = np.cross(a, b)
     if np.linalg.norm(axis) < 1e-12:
         axis = np.cross(a, np.eye(3)[(a * a).argmin()])
     axis = axis / np.linalg.norm(axis)
     half_turn = 2 * np.outer(axis, axis) - np.eye(3)
-    out: Floats = _smallturned(-a, b) @ half_turn
+    out: Floats = _small_turn(-a, b) @ half_turn
     return out
 
 
@@ -213,7 +213,7 @@ def _direction(vector: Floats) -> Floats:
     return out
 
 
-def _smallturned(a: Floats, b: Floats) -> Floats:
+def _small_turn(a: Floats, b: Floats) -> Floats:
     """Rodrigues' rotation of unit a to unit b, at most a right angle apart."""
     x, y, z = np.cross(a, b)
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

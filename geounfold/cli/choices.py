@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from geounfold.cli.frames import three_numbers
 from geounfold.errors import InputError, OptionError
 from geounfold.io.tables import existing_file
 
@@ -26,7 +27,7 @@ def unfold_options(args: Namespace) -> UnfoldOptions:
     from geounfold.options import UnfoldOptions
 
     readers: dict[str, Callable[[str], Any]] = {
-        "up": _direction,
+        "up": lambda text: three_numbers(text, "--up", "0,0,1"),
         "body": _body,
         "neighbours": lambda text: whole_number(text, "--neighbours"),
         "reach": _reach,
@@ -74,14 +75,6 @@ def whole_number(text: str, option: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
     return int(text)
-
-
-def _direction(text: str) -> tuple[float, float, float]:
-    try:
-        x, y, z = (float(word) for word in text.split(","))
-    except ValueError as error:
-        raise OptionError(f"--up needs three numbers such as 0,0,1, not '{text}'") from error
-    return x, y, z
 
 
 def _reach(text: str) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from geounfold.cli.choices import whole_number
 from geounfold.errors import InputError, OptionError
 from geounfold.io.tables import existing_file
 
@@ -36,7 +37,7 @@ def estimation(
     near = _neighbourhood(args)
     mean = None if args.mean is None else _number(args.mean, "--mean")
     power = _number(args.power, "--power")
-    workers = _whole(args.workers, "--workers")
+    workers = whole_number(args.workers, "--workers")
     variogram = None if args.variogram is None else _variogram(args.variogram)
     from geounfold import mapping
     from geounfold.estimation import estimate
@@ -92,7 +93,7 @@ def _hole(samples: PointTable) -> str | None:
 def _neighbourhood(args: Namespace) -> dict[str, Any]:
     """Return what was said of the search."""
     near: dict[str, Any] = {
-        name: _whole(getattr(args, name), f"--{name.replace('_', '-')}")
+        name: whole_number(getattr(args, name), f"--{name.replace('_', '-')}")
         for name in _WHOLE
         if getattr(args, name) is not None
     }
@@ -131,9 +132,3 @@ def _number(text: str, option: str) -> float:
     if not np.isfinite(value):
         raise OptionError(f"{option} needs a finite number, not '{text}'")
     return value
-
-
-def _whole(text: str, option: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
-    return int(text)

@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from geounfold.mesh import Floats
 
 
-def three_numbers(text: str, option: str) -> tuple[float, float, float]:
-    """Return the three numbers of an option such as 10,10,5."""
+def three_numbers(text: str, option: str, such: str = "10,10,5") -> tuple[float, float, float]:
+    """Return the three numbers that an option is given, one such as ``such``."""
     try:
         a, b, c = (float(word) for word in text.split(","))
     except ValueError as error:
-        raise OptionError(f"{option} needs three numbers such as 10,10,5, not '{text}'") from error
+        raise OptionError(f"{option} needs three numbers such as {such}, not '{text}'") from error
     return a, b, c
 
 

@@ -161,7 +161,8 @@ def fit_body(
     SplitError
         No part of the top has a parallel bottom; or merged blocks are too coarse for the body.
     ControlMeshError
-        Of merged blocks: it could not be proved, or does not hold every block.
+        The blocks lie on the mid surface in parts; or of merged blocks: it could not be proved, or
+        does not hold every block.
     """
     unit = 1 if coarse is None else coarse.merge
     medial = medial_sheet(split, _parameters, options.medial)
@@ -172,7 +173,6 @@ def fit_body(
     def first(fit: FitOptions) -> FittedSheet:
         return fit_sheet(medial, samples, cells, fit).scaled(unit)
 
-    sites = None
     fitted, fit = _first(first, options)
     if coarse is not None and fitted.roughness > _TOO_ROUGH * unit:
         raise SplitError(f"cells of {unit} blocks a side are too coarse for the body's bends")

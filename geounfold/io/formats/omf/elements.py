@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from geounfold.errors import InputError
 from geounfold.io.formats.frames import flattened
 from geounfold.io.formats.grids import Blocks, with_sides
 from geounfold.io.formats.registry import Meta, Points
 from geounfold.io.formats.units import unit_name
 from geounfold.io.tables import unique_names
+from geounfold.mesh import Floats, Ints
 
 
 class Kind(Enum):
@@ -62,6 +65,22 @@ def values_by_name(found: Iterable[tuple[str, np.ndarray]], rows: int) -> dict[s
     return columns
 
 
+def of_parents(
+    found: Iterable[tuple[str, np.ndarray]], parent: Ints, count: int
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield values of ``count`` parent blocks at their sub-blocks, whose rows ``parent`` (n,) are.
+
+    Raises
+    ------
+    ValueError
+        An array has not one value for each parent block.
+    """
+    for name, array in found:
+        if len(array) != count:
+            raise ValueError(f"'{name}' has {len(array)} values for {count} blocks")
+        yield name, array[parent]
+
+
 def block_points(blocks: Blocks, found: Iterable[tuple[str, np.ndarray]], meta: Meta) -> Points:
     """Return a block model's centroids with its values, sides and places."""
     values = values_by_name(found, len(blocks.ijk))
@@ -79,6 +98,16 @@ def words_of(codes: np.ndarray, legend: Mapping[int, str]) -> np.ndarray:
     known, back = np.unique(codes, return_inverse=True)
     words = np.array([str(legend.get(int(code), "")) for code in known], dtype=object)
     return np.asarray(words[back.ravel()], dtype=object) if len(words) else words
+
+
+def vector(value: Any) -> Floats:
+    """Return three numbers of an index, (3,)."""
+    return np.asarray(value, dtype=np.float64).reshape(3)
+
+
+def unread_version(path: Path, version: object) -> InputError:
+    """Return the error that names a file's version, which is none of those that are read."""
+    return InputError(f"{path}: is an OMF file of a version that is not read: {version!r}")
 
 
 def told(unit: str | None, reference: str | None) -> Meta:

@@ -21,13 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from geounfold.errors import InputError
 from geounfold.io.formats.grids import Blocks, places, regular_grid, tensor_grid
 from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
+    of_parents,
     told,
+    unread_version,
     values_by_name,
     words_of,
 )
@@ -78,9 +79,7 @@ def elements(path: Path) -> list[Element]:
     with zipfile.ZipFile(path) as archive:
         project = json.loads(archive.read(INDEX))
     if project.get("version") not in _VERSIONS:
-        raise InputError(
-            f"{path}: is an OMF file of a version that is not read: {project['version']!r}"
-        )
+        raise unread_version(path, project["version"])
     file = _File(path, project.get("metadata", {}))
     return [_element(file, entry) for entry in _flat(project["elements"])]
 
@@ -120,15 +119,8 @@ def _block_model(file: _File, entry: dict[str, Any]) -> Points:
     blocks, counts = _blocks(file, entry)
     found = list(_values(file, entry, ("cells", "sub_blocks")))
     own = np.repeat(np.arange(len(counts)), counts)  # of each block, its parent among those there
-    parents = _values(file, entry, ("parent_blocks",))
-    found += [(name, array[own]) for name, array in parents if _whole(name, array, len(counts))]
+    found += of_parents(_values(file, entry, ("parent_blocks",)), own, len(counts))
     return block_points(blocks, found, file.meta(entry))
-
-
-def _whole(name: str, array: np.ndarray, rows: int) -> bool:
-    if len(array) != rows:
-        raise ValueError(f"'{name}' has {len(array)} values for {rows} blocks")
-    return True
 
 
 def _blocks(file: _File, entry: dict[str, Any]) -> tuple[Blocks, Ints]:

@@ -18,14 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from geounfold.errors import InputError
 from geounfold.io.formats.grids import places, tensor_grid
 from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
     told,
+    unread_version,
     values_by_name,
+    vector,
     words_of,
 )
 from geounfold.io.formats.registry import Meta, Points, Surface
@@ -66,7 +67,7 @@ class _File:
 
     @property
     def origin(self) -> Floats:
-        return _vector(self.project["origin"])
+        return vector(self.project["origin"])
 
     @property
     def meta(self) -> Meta:
@@ -85,7 +86,7 @@ def elements(path: Path) -> list[Element]:
         _, version, key, start = _HEADER.unpack(stream.read(_HEADER.size))
         if not version.startswith(_VERSION):
             named = version.rstrip(b"\0").decode("latin-1")
-            raise InputError(f"{path}: is an OMF file of a version that is not read: {named!r}")
+            raise unread_version(path, named)
         stream.seek(start)
         index = json.loads(stream.read().decode("utf-8"))
     file = _File(path, index, index[str(uuid.UUID(bytes=key))])
@@ -104,7 +105,7 @@ def _points(file: _File, entry: dict[str, Any], geometry: dict[str, Any]) -> Poi
 
 
 def _blocks(file: _File, entry: dict[str, Any], geometry: dict[str, Any]) -> Points:
-    corner = _vector(geometry["origin"]) + file.origin
+    corner = vector(geometry["origin"]) + file.origin
     axes, widths = ([geometry[f"{what}_{a}"] for a in "uvw"] for what in ("axis", "tensor"))
     grid = tensor_grid(corner, axes, widths)
     # The library's own examples flatten arrays of (u, v, w): w runs fastest.
@@ -126,13 +127,9 @@ _LOADERS = {Kind.POINTS: _points, Kind.BLOCKS: _blocks, Kind.SURFACE: _surface}
 
 
 def _vertices(file: _File, geometry: dict[str, Any]) -> Floats:
-    own = _vector(geometry["origin"])
+    own = vector(geometry["origin"])
     V = np.asarray(file.array(geometry["vertices"]), dtype=np.float64)
     return V + own + file.origin
-
-
-def _vector(value: Any) -> Floats:
-    return np.asarray(value, dtype=np.float64).reshape(3)
 
 
 def _values(file: _File, entry: dict[str, Any], location: str) -> Iterator[tuple[str, np.ndarray]]:

@@ -20,14 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from geounfold.errors import InputError
 from geounfold.io.formats.grids import Blocks, Grid, places, regular_grid, tensor_grid
 from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
+    of_parents,
     told,
+    unread_version,
     values_by_name,
+    vector,
     words_of,
 )
 from geounfold.io.formats.registry import Meta, Points, Surface
@@ -66,7 +68,7 @@ class _File:
 
     @property
     def origin(self) -> Floats:
-        return _vector(self.project.get("origin", _NO_ORIGIN))
+        return vector(self.project.get("origin", _NO_ORIGIN))
 
     @property
     def meta(self) -> Meta:
@@ -85,7 +87,7 @@ def elements(path: Path) -> list[Element]:
     with zipfile.ZipFile(path) as archive:
         version = archive.comment.removeprefix(COMMENT).decode("latin-1")
         if not re.match(r"2(\D|$)", version):
-            raise InputError(f"{path}: is an OMF file of a version that is not read: {version!r}")
+            raise unread_version(path, version)
         project = json.loads(gzip.decompress(archive.read(_INDEX)))
     file = _File(path, project)
     return [_element(file, entry) for entry in _flat(project.get("elements", []))]
@@ -122,7 +124,7 @@ def _surface(file: _File, entry: dict[str, Any]) -> Surface:
 
 def _vertices(file: _File, geometry: dict[str, Any]) -> Floats:
     V = file.columns(geometry["vertices"], "x", "y", "z").astype(np.float64)
-    return np.asarray(V + _vector(geometry.get("origin", _NO_ORIGIN)) + file.origin)
+    return np.asarray(V + vector(geometry.get("origin", _NO_ORIGIN)) + file.origin)
 
 
 def _block_model(file: _File, entry: dict[str, Any]) -> Points:
@@ -134,16 +136,13 @@ def _block_model(file: _File, entry: dict[str, Any]) -> Points:
     blocks = _subblocks(file, grid, geometry["subblocks"])
     found = list(_values(file, entry, "Subblocks"))
     parent = np.ravel_multi_index(tuple(blocks.ijk.T), grid.shape, order="F")
-    for name, array in _values(file, entry, "Primitives"):
-        if len(array) != np.prod(grid.shape):
-            raise ValueError(f"'{name}' has {len(array)} values for {np.prod(grid.shape)} blocks")
-        found.append((name, array[parent]))
+    found += of_parents(_values(file, entry, "Primitives"), parent, int(np.prod(grid.shape)))
     return block_points(blocks, found, file.meta)
 
 
 def _grid(file: _File, geometry: dict[str, Any]) -> Grid:
     orient, grid = geometry["orient"], geometry["grid"]
-    corner = _vector(orient.get("origin", _NO_ORIGIN)) + file.origin
+    corner = vector(orient.get("origin", _NO_ORIGIN)) + file.origin
     axes = [orient.get(a, along) for a, along in _AXES.items()]
     if grid["type"] == "Regular":
         return regular_grid(corner, axes, grid["count"], grid["size"])
@@ -158,7 +157,7 @@ def _subblocks(file: _File, grid: Grid, parts: dict[str, Any]) -> Blocks:
     ijk = table[:, :3].astype(np.int64)
     if parts["type"] not in ("Regular", "Freeform"):
         raise ValueError(f"sub-blocks are of the unknown type '{parts['type']}'")
-    division = _vector(parts["count"]) if parts["type"] == "Regular" else np.ones(3)
+    division = vector(parts["count"]) if parts["type"] == "Regular" else np.ones(3)
     return grid.blocks(ijk, table[:, 3:6] / division, table[:, 6:] / division)
 
 
@@ -203,7 +202,3 @@ def _numbers(column: Any) -> np.ndarray:
     if column.null_count:
         column = compute.cast(column, pa.float64(), safe=False)
     return np.asarray(column.to_numpy(zero_copy_only=False))
-
-
-def _vector(value: Any) -> Floats:
-    return np.asarray(value, dtype=np.float64).reshape(3)

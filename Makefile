@@ -86,7 +86,7 @@ $(DOCS_STAMP): $(STAMP)
 	@touch $@
 
 docs: $(DOCS_STAMP)  ## build the documentation into site/, its examples run first
-	$(BIN)/python -m pytest -q tests/test_docs.py $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -q tests/whole/test_docs.py $(PYTEST_ARGS)
 	NO_MKDOCS_2_WARNING=1 COLUMNS=100 $(BIN)/mkdocs build --strict --quiet
 	@echo "Documentation: $(CURDIR)/site/index.html"
 

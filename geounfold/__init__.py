@@ -15,17 +15,10 @@ from typing import TYPE_CHECKING, Any
 from geounfold._version import __version__
 
 if TYPE_CHECKING:
-    from geounfold.blockmodel import (
-        BlockModel,
-        ModelFrame,
-        axes_from_angles,
-        block_model,
-        regular_grid,
-        transfer,
-    )
-    from geounfold.clusters import map_partitions
-    from geounfold.comparison import compare
-    from geounfold.control import ControlMesh
+    from geounfold.body.block_model import BlockModel, regular_grid
+    from geounfold.body.model_frame import ModelFrame, axes_from_angles
+    from geounfold.comparison.crosscheck import CrossCheck, crosscheck
+    from geounfold.comparison.flatteners import compare
     from geounfold.drillholes import DrillHoles, read_drillholes
     from geounfold.errors import GeounfoldError, InputError
     from geounfold.estimation import (
@@ -35,28 +28,33 @@ if TYPE_CHECKING:
         estimate,
         explore,
         fit_variogram,
+        transfer,
     )
-    from geounfold.estimator import Unfolder
     from geounfold.flattening import FLATTENERS, Flattening, flatten
-    from geounfold.mapping import UnfoldingMap, load
-    from geounfold.mesh import TetMesh, TriMesh
-    from geounfold.options import UnfoldOptions
-    from geounfold.pipeline import Unfolding, unfold
-    from geounfold.quality import aligned_rms, epsilon, neighbours, nmd
+    from geounfold.geometry.mesh import TetMesh, TriMesh
+    from geounfold.io.block_sizes import block_model
+    from geounfold.mapping.control_mesh import ControlMesh
+    from geounfold.mapping.mesh_map import UnfoldingMap, load
+    from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
+    from geounfold.quality.truth import aligned_rms
     from geounfold.synthetic import simulate
-    from geounfold.verification import CrossCheck, crosscheck
+    from geounfold.unfolding.dask_map import map_partitions
+    from geounfold.unfolding.options import UnfoldOptions
+    from geounfold.unfolding.result import Unfolding
+    from geounfold.unfolding.run import unfold
+    from geounfold.unfolding.sklearn_unfolder import Unfolder
 
 _HOMES = {
-    "BlockModel": "blockmodel",
-    "ModelFrame": "blockmodel",
-    "axes_from_angles": "blockmodel",
-    "block_model": "blockmodel",
-    "regular_grid": "blockmodel",
-    "transfer": "blockmodel",
-    "compare": "comparison",
-    "ControlMesh": "control",
-    "CrossCheck": "verification",
-    "crosscheck": "verification",
+    "BlockModel": "body.block_model",
+    "ModelFrame": "body.model_frame",
+    "axes_from_angles": "body.model_frame",
+    "block_model": "io.block_sizes",
+    "regular_grid": "body.block_model",
+    "transfer": "estimation.transfer",
+    "compare": "comparison.flatteners",
+    "ControlMesh": "mapping.control_mesh",
+    "CrossCheck": "comparison.crosscheck",
+    "crosscheck": "comparison.crosscheck",
     "DrillHoles": "drillholes",
     "read_drillholes": "drillholes",
     "GeounfoldError": "errors",
@@ -70,15 +68,15 @@ _HOMES = {
     "FLATTENERS": "flattening",
     "Flattening": "flattening",
     "flatten": "flattening",
-    "UnfoldingMap": "mapping",
-    "load": "mapping",
-    "map_partitions": "clusters",
-    "TetMesh": "mesh",
-    "TriMesh": "mesh",
-    "UnfoldOptions": "options",
-    "Unfolder": "estimator",
-    "Unfolding": "pipeline",
-    "unfold": "pipeline",
+    "UnfoldingMap": "mapping.mesh_map",
+    "load": "mapping.mesh_map",
+    "map_partitions": "unfolding.dask_map",
+    "TetMesh": "geometry.mesh",
+    "TriMesh": "geometry.mesh",
+    "UnfoldOptions": "unfolding.options",
+    "Unfolder": "unfolding.sklearn_unfolder",
+    "Unfolding": "unfolding.result",
+    "unfold": "unfolding.run",
     "aligned_rms": "quality",
     "epsilon": "quality",
     "neighbours": "quality",

@@ -29,19 +29,16 @@ from IPython.display import Image
 
 import geounfold as gu
 from geounfold.flattening import measures
-from geounfold.geometry import enclosed_volume
-from geounfold.plotting import (
+from geounfold.geometry.measures import enclosed_volume
+from geounfold.quality.truth import compare_with_truth
+from geounfold.report.plots.bodies import (
     draw_bodies,
     draw_body,
     draw_control,
-    draw_curves,
-    draw_distribution,
     draw_split,
     draw_surface,
-    png,
-    ratio_limits,
 )
-from geounfold.quality import compare_with_truth
+from geounfold.report.plots.figures import draw_curves, draw_distribution, png, ratio_limits
 
 body = gu.simulate("sim_case_1")
 X, W = body

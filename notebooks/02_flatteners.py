@@ -27,9 +27,10 @@ import numpy as np
 from IPython.display import Image
 
 import geounfold as gu
-from geounfold.geometry import triangle_areas
+from geounfold.geometry.measures import triangle_areas
 from geounfold.io import read_surface
-from geounfold.plotting import draw_surface, png
+from geounfold.report.plots.bodies import draw_surface
+from geounfold.report.plots.figures import png
 
 SHARED = Path("../../shared/data")
 

@@ -37,7 +37,8 @@ from IPython.display import Image, display
 from scipy.interpolate import griddata
 
 import geounfold as gu
-from geounfold.plotting import draw_bodies, draw_body, png
+from geounfold.report.plots.bodies import draw_bodies, draw_body
+from geounfold.report.plots.figures import png
 
 RUNS = int(os.environ.get("GEOUNFOLD_RUNS", "10"))
 METHODS = ("thesis", "ufo", "sheet")

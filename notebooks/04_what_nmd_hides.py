@@ -30,8 +30,9 @@ import pandas as pd
 from IPython.display import Image
 
 import geounfold as gu
-from geounfold.plotting import draw_bodies, draw_body, png
-from geounfold.quality import TruthQuality, compare_with_truth
+from geounfold.quality.truth import TruthQuality, compare_with_truth
+from geounfold.report.plots.bodies import draw_bodies, draw_body
+from geounfold.report.plots.figures import png
 
 X, W = gu.simulate("sim_case_1")
 u = gu.unfold(X)

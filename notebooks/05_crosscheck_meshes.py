@@ -29,10 +29,11 @@ import numpy as np
 from IPython.display import Image
 
 import geounfold as gu
-from geounfold.meshplots import draw_cuts, draw_histograms
-from geounfold.plotting import draw_bodies, png
+from geounfold.geometry.tet_shapes import dihedral_angles, radius_ratios
+from geounfold.report.plots.bodies import draw_bodies
+from geounfold.report.plots.crosscheck import draw_cuts, draw_histograms
+from geounfold.report.plots.figures import png
 from geounfold.synthetic import CASES
-from geounfold.tetshape import dihedral_angles, radius_ratios
 
 body = gu.simulate("steep", blocks=6000)
 X, W = body

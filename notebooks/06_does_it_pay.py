@@ -35,8 +35,9 @@ from IPython.display import Image
 from matplotlib.figure import Figure
 
 import geounfold as gu
-from geounfold.charts import charts
-from geounfold.plotting import draw_bodies, png
+from geounfold.report.plots.bodies import draw_bodies
+from geounfold.report.plots.figures import png
+from geounfold.report.plots.grades import charts
 from geounfold.synthetic import PATTERNS, drill
 
 ROOT = next(p for p in (Path.cwd(), *Path.cwd().parents) if (p / "tests/study").is_dir())

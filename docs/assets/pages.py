@@ -14,7 +14,7 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def _help() -> str:
-    from geounfold.cli.parser import build_parser
+    from geounfold.cli.arguments.parser import build_parser
 
     parser = build_parser()
     chosen = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]

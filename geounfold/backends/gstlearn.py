@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import BackendError, MissingDependencyError
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 ISLANDS = 16
 """Targets a call: the library's cost per target is lowest there, and offsets stay small."""

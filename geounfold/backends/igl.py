@@ -7,7 +7,7 @@ import igl.predicates
 import numpy as np
 
 from geounfold.errors import BackendError
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 
 def _f(a: Floats) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import BackendError, MissingDependencyError
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 # What MeshLab says when a plugin, whose system library is missing, was left out on import.
 _ABSENT = ("Filter does not exists", "Unknown format")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 
 def tetrahedralize(V: Floats, F: Ints, edge: float, envelope: float) -> tuple[Floats, Ints]:

@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 
-from geounfold.cli.console import Console
-from geounfold.cli.journal import Journal
-from geounfold.cli.parser import parse
-from geounfold.cli.stops import STOPS, ignore_stops, stop_of, stoppable
-from geounfold.cli.supervise import supervised
+from geounfold.backends.threads import memory_is_limited
+from geounfold.cli.arguments.parser import parse
+from geounfold.cli.process.journal import Journal
+from geounfold.cli.process.signals import STOPS, ignore_stops, stop_of, stoppable
+from geounfold.cli.process.supervise import supervised
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError
-from geounfold.threads import memory_is_limited
 
 _NO_MEMORY = re.compile(
     r"cannot allocate memory|failed to map segment|bad[_ ]alloc|out of memory|unable to allocate"

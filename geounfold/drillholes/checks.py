@@ -15,7 +15,7 @@ from geounfold.drillholes.desurvey import directions, dogleg
 from geounfold.drillholes.findings import ERROR, NOTE, WARNING, Log, Severity
 from geounfold.drillholes.tables import HoleTable
 from geounfold.errors import InputError
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 LEFT_OUT = "left out"
 

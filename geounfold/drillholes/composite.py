@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 Residual = Literal["merge", "drop", "keep"]
 RESIDUALS = get_args(Residual)

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 _SMALL = 1e-4  # radians; there the series' next term is below 1e-27
 

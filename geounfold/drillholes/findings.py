@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from geounfold.io._text import counted, shown
+from geounfold.io.messages import counted, shown
 
 Severity = Literal["note", "warning", "error"]
 NOTE: Severity = "note"

@@ -15,14 +15,9 @@ from geounfold.drillholes.checks import Collars, Intervals, Stations
 from geounfold.drillholes.composite import CompositeOptions, Residual, composite
 from geounfold.drillholes.desurvey import Paths, desurvey, directions
 from geounfold.drillholes.findings import ERROR, NOTE, Finding, Log, facts, messages, refusal
-from geounfold.drillholes.tables import (
-    HoleTable,
-    check_fields,
-    grade_columns,
-    read_hole_table,
-)
+from geounfold.drillholes.tables import HoleTable, check_fields, grade_columns, read_hole_table
 from geounfold.errors import InputError, OptionError
-from geounfold.mesh import Bools, Floats
+from geounfold.geometry.mesh import Bools, Floats
 
 SURVEYED, EXTRAPOLATED = "surveyed", "extrapolated"
 SAMPLE_COLUMNS = ("hole", "from", "to", "x", "y", "z", "position", "coverage")

@@ -11,10 +11,12 @@ import pandas as pd
 
 from geounfold.drillholes.findings import WARNING, Log
 from geounfold.errors import InputError, OptionError
-from geounfold.io._text import listing, shown
-from geounfold.io.coordinates import LARGEST_COORDINATE, plain_name, readable_numbers
-from geounfold.io.tables import Table, objects, read_table, unique_names
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.measures import LARGEST_COORDINATE
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.column_values import objects, unique_names
+from geounfold.io.coordinate_columns import plain_name, readable_numbers
+from geounfold.io.messages import listing, shown
+from geounfold.io.tables.files import Table, read_table
 
 HOLE = "hole"
 _HOLE = (

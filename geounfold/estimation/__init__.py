@@ -7,12 +7,7 @@ the samples first, `scores` judges. The systems are solved by gstlearn (extra ``
 
 from geounfold.estimation.estimate import Estimation, FlatSamples, estimate, flat_samples
 from geounfold.estimation.exploration import Exploration, contact, explore, histogram, swath
-from geounfold.estimation.fit import (
-    FEWEST_SAMPLES,
-    FittedVariogram,
-    directional,
-    fit_variogram,
-)
+from geounfold.estimation.fit import FEWEST_SAMPLES, FittedVariogram, directional, fit_variogram
 from geounfold.estimation.kriging import (
     FLAGS,
     METHODS,

@@ -24,10 +24,10 @@ from geounfold.estimation.kriging import (
 from geounfold.estimation.neighbourhood import Neighbourhood
 from geounfold.estimation.scores import Conservation, conservation
 from geounfold.estimation.variogram import Triple, Variogram
-from geounfold.io.coordinates import numbers, plain_name
-from geounfold.io.results import frame_points
-from geounfold.mapping import Carried, checked_points
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.coordinate_columns import numbers, plain_name
+from geounfold.io.result_columns import frame_points
+from geounfold.mapping.carried import Carried, checked_points
 
 _REACH = 2.0  # ranges: radii of the search where none are given
 _PLAIN = {"min_samples", "max_samples", "max_per_hole"}

@@ -12,7 +12,7 @@ import pandas as pd
 from geounfold.errors import InputError, OptionError
 from geounfold.estimation.estimate import FlatSamples, flat_samples
 from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)

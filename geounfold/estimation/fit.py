@@ -17,16 +17,9 @@ import pandas as pd
 from scipy.optimize import least_squares, nnls
 
 from geounfold.errors import InputError, OptionError
-from geounfold.estimation.variogram import (
-    KINDS,
-    Structure,
-    Triple,
-    Variogram,
-    correlation,
-    numbers,
-)
-from geounfold.mesh import Floats
-from geounfold.synthetic.body import rotation as turned
+from geounfold.estimation.variogram import KINDS, Structure, Triple, Variogram, correlation, numbers
+from geounfold.geometry.mesh import Floats
+from geounfold.geometry.rotations import rotation_from_angles as turned
 
 Anisotropy = Literal["isotropic", "transverse", "orthotropic"]
 ANISOTROPIES: tuple[str, ...] = get_args(Anisotropy)

@@ -17,7 +17,7 @@ from geounfold.errors import InputError, OptionError
 from geounfold.estimation.neighbourhood import Neighbourhood, Search
 from geounfold.estimation.variogram import Variogram
 from geounfold.estimation.worker import apart
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 Method = Literal["ordinary", "simple", "inverse_distance"]
 METHODS: tuple[str, ...] = get_args(Method)

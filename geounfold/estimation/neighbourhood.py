@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from geounfold.errors import OptionError
 from geounfold.estimation.variogram import Triple, numbers
-from geounfold.mesh import Bools, Floats, Ints
-from geounfold.synthetic.body import rotation as turned
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.geometry.rotations import rotation_from_angles as turned
 
 
 @dataclass(frozen=True, kw_only=True)

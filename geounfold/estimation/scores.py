@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 
 
 @dataclass(frozen=True)

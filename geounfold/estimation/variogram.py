@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats
-from geounfold.synthetic.body import rotation as turned
+from geounfold.geometry.mesh import Floats
+from geounfold.geometry.rotations import rotation_from_angles as turned
 
 KINDS = ("spherical", "exponential", "gaussian")
 """The structures."""

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geounfold.errors import FlatteningError, OptionError
-from geounfold.flattening._ladder import one_to_one
 from geounfold.flattening._problem import Problem, collapsed, make_problem, upright
+from geounfold.flattening._repair import one_to_one
 from geounfold.flattening._result import Flattening, Stop
+from geounfold.flattening._start import check_disk
+from geounfold.flattening._start import tutte as _tutte
 from geounfold.flattening.arap import ArapOptions, arap
 from geounfold.flattening.harmonic import HarmonicOptions, harmonic
-from geounfold.flattening.initial import check_disk
-from geounfold.flattening.initial import tutte as _tutte
 from geounfold.flattening.isomap import IsomapOptions, isomap
 from geounfold.flattening.lscm import LscmOptions, lscm
 from geounfold.flattening.mds import MdsOptions, mds
@@ -25,7 +25,7 @@ from geounfold.flattening.slim import SlimOptions, slim
 from geounfold.flattening.spring import SpringOptions, spring
 from geounfold.flattening.spring_dynamic import SpringDynamicOptions, spring_dynamic
 from geounfold.flattening.ufo import UfoOptions, ufo
-from geounfold.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
 
 __all__ = [
     "FLATTENERS",

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.backends.planar import orientations
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.backends.predicates import orientations
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 #: The four pairs of children of a pair of boxes.
 _FIRST, _SECOND = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 
 def factor(matrix: sp.csc_array, ordered: bool = False) -> spl.SuperLU:

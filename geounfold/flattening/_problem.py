@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from geounfold.flattening._border import turned_over
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.geometry import lengths, triangle_areas, unique_edges
-from geounfold.mesh import Floats, Ints, TriMesh
+from geounfold.geometry.measures import lengths, triangle_areas, unique_edges
+from geounfold.geometry.mesh import Floats, Ints, TriMesh
 
 Complex = NDArray[np.complex128]
 

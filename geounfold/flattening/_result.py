@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from geounfold.flattening._border import Border, border_of
-from geounfold.mesh import Floats, Ints, TriMesh
+from geounfold.geometry.mesh import Floats, Ints, TriMesh
 
 
 class Stop(StrEnum):

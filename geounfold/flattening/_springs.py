@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 
 def spring_energy(uv: Floats, edges: Ints, rest: Floats, stiffness: float = 1.0) -> float:

@@ -10,9 +10,9 @@ from geounfold.backends import igl as backend
 from geounfold.errors import BackendError, FlatteningError, OptionError
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening.initial import tutte
+from geounfold.flattening._start import tutte
 from geounfold.flattening.measures import arap_energy
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 
 #: Steps between two entries of the history.
 RECORD = 10

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geounfold.backends import distances as backend
+from geounfold.backends import geodesics as backend
 from geounfold.errors import BackendError, FlatteningError, OptionError
 from geounfold.flattening._border import is_one_to_one
 from geounfold.flattening._problem import History, Problem, finish
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening.initial import circle, tutte
+from geounfold.flattening._start import circle, tutte
 from geounfold.flattening.measures import symmetric_dirichlet
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 
 WEIGHTS = ("cotangent", "uniform")
 

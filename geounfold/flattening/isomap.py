@@ -10,11 +10,11 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from geounfold.errors import OptionError
-from geounfold.flattening._landmarks import by_distances, to_landmarks
+from geounfold.flattening._classical_scaling import by_distances, to_landmarks
 from geounfold.flattening._problem import Problem
 from geounfold.flattening._result import Flattening
-from geounfold.geometry import lengths
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.measures import lengths
+from geounfold.geometry.mesh import Floats, Ints
 
 #: Relative difference of distances that is rounding: neighbours as far as the last one of k are
 #: all taken, so that the order of the vertices decides nothing.

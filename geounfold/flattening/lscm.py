@@ -10,10 +10,10 @@ from geounfold.backends import igl as backend
 from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._problem import History, Problem, collapsed, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening.initial import tutte
+from geounfold.flattening._start import tutte
 from geounfold.flattening.measures import conformal_energy
-from geounfold.geometry import triangle_areas
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.measures import triangle_areas
+from geounfold.geometry.mesh import Floats, Ints
 
 
 @dataclass(frozen=True, kw_only=True)

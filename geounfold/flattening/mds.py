@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.backends.distances import SurfaceDistances
+from geounfold.backends.geodesics import SurfaceDistances
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.flattening._landmarks import by_distances, to_landmarks
+from geounfold.flattening._classical_scaling import by_distances, to_landmarks
 from geounfold.flattening._problem import Problem
 from geounfold.flattening._result import Flattening
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 
 DISTANCES = ("auto", "exact", "heat")
 

@@ -9,14 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from geounfold.flattening._problem import (
-    edge_of_side,
-    flip_count,
-    lay_out,
-    relative_area_error,
-)
-from geounfold.geometry import lengths, triangle_areas, unique_edges
-from geounfold.mesh import Floats, Ints
+from geounfold.flattening._problem import edge_of_side, flip_count, lay_out, relative_area_error
+from geounfold.geometry.measures import lengths, triangle_areas, unique_edges
+from geounfold.geometry.mesh import Floats, Ints
 
 
 def stretches(V: Floats, F: Ints, uv: Floats) -> tuple[Floats, Floats]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geounfold.backends.injective import ScaffoldSteps
+from geounfold.backends.slim_scaf import ScaffoldSteps
 from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._border import is_one_to_one
-from geounfold.flattening._injective import InjectiveOptions, Run, descend
+from geounfold.flattening._checked_descent import InjectiveOptions, Run, descend
 from geounfold.flattening._problem import Problem, finish
 from geounfold.flattening._result import Flattening
-from geounfold.flattening.initial import tutte
-from geounfold.mesh import Floats
+from geounfold.flattening._start import tutte
+from geounfold.geometry.mesh import Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,27 +9,17 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
-from geounfold.backends.injective import SlimSteps
+from geounfold.backends.slim_scaf import SlimSteps
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.flattening._guard import FoldGuard
-from geounfold.flattening._linear import (
-    PinnedSolver,
-    edge_laplacian,
-    factor,
-    preconditioned_solve,
-)
+from geounfold.flattening._flip_barrier import FoldGuard
+from geounfold.flattening._linear import PinnedSolver, edge_laplacian, factor, preconditioned_solve
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening._rigid import RigidSteps, relax
-from geounfold.flattening._springs import (
-    BlockPattern,
-    spring_blocks,
-    spring_energy,
-    spring_forces,
-)
-from geounfold.flattening.initial import plan, tutte
-from geounfold.geometry import lengths
-from geounfold.mesh import Floats, Ints
+from geounfold.flattening._springs import BlockPattern, spring_blocks, spring_energy, spring_forces
+from geounfold.flattening._start import plan, tutte
+from geounfold.flattening._warm_start import RigidSteps, relax
+from geounfold.geometry.measures import lengths
+from geounfold.geometry.mesh import Floats, Ints
 
 #: Least share of the predicted decrease that a step must bring (Armijo).
 ARMIJO = 1e-4

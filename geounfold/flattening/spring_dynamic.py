@@ -16,11 +16,11 @@ from geounfold.flattening._problem import (
     relative_area_error,
 )
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening._rigid import RigidSteps, relax
 from geounfold.flattening._springs import spring_energy, spring_forces
-from geounfold.flattening.initial import plan, tutte
-from geounfold.geometry import vertex_sum
-from geounfold.mesh import Floats
+from geounfold.flattening._start import plan, tutte
+from geounfold.flattening._warm_start import RigidSteps, relax
+from geounfold.geometry.measures import vertex_sum
+from geounfold.geometry.mesh import Floats
 
 #: Steps between two looks at the energy and displacement (and entries of the history).
 WINDOW = 50

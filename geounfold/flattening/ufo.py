@@ -9,14 +9,9 @@ import numpy as np
 from geounfold.errors import FlatteningError, OptionError
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
-from geounfold.flattening.initial import plan
-from geounfold.flattening.spring_dynamic import (
-    ROUNDING,
-    WINDOW,
-    Motion,
-    SpringDynamicOptions,
-)
-from geounfold.mesh import Floats
+from geounfold.flattening._start import plan
+from geounfold.flattening.spring_dynamic import ROUNDING, WINDOW, Motion, SpringDynamicOptions
+from geounfold.geometry.mesh import Floats
 
 #: Relative rise of the energy in the first step from rest that is no rounding but a time step too
 #: large for the springs.

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Protocol
 
 from geounfold.errors import OutputError
-from geounfold.io._text import shown
-from geounfold.io.tables import ending
+from geounfold.io.messages import shown
+from geounfold.io.paths import ending
 
 
 class Watcher(Protocol):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.formats.vtk import add_text, save
-from geounfold.mesh import Floats, Ints
 
 
 def write_polylines(

@@ -10,19 +10,13 @@ import pandas as pd
 from scipy.spatial import Delaunay
 
 from geounfold.errors import BackendError, InputError, MeshError, OutputError
-from geounfold.io._text import listing, rows_named
-from geounfold.io.coordinates import coordinate_columns, numbers
+from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.io.coordinate_columns import coordinate_columns, numbers
 from geounfold.io.formats import Surface, find_format, point_endings, surface_endings
-from geounfold.io.points import PointTable, read_points
-from geounfold.io.tables import (
-    TABLE_ENDINGS,
-    Table,
-    ending,
-    existing_file,
-    read_table,
-    write_table,
-)
-from geounfold.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.io.messages import listing, rows_named
+from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file
+from geounfold.io.tables.files import Table, read_table, write_table
+from geounfold.io.tables.points import PointTable, read_points
 
 MESH_ENDINGS = surface_endings()
 SURFACE_ENDINGS = (*MESH_ENDINGS, *TABLE_ENDINGS)

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from geounfold.methods.contract import Body, BodyFit, Method, Placed, Pointwise, SurfacePair
-from geounfold.methods.heights import VerticalOptions
-from geounfold.methods.isomap import IsomapOptions, fit_isomap
-from geounfold.methods.pointmap import PointwiseMap, no_mesh
+from geounfold.methods.contract import BodyFit, Method, Placed, Pointwise, PreparedBody, SurfacePair
+from geounfold.methods.isomap import IsomapMethodOptions, fit_isomap
+from geounfold.methods.pointwise_map import PointwiseMap, no_mesh
 from geounfold.methods.shear import fit_shear
-from geounfold.methods.sheet import fit_sheet
+from geounfold.methods.sheet.method import sheet_method
 from geounfold.methods.stratigraphic import fit_stratigraphic
-from geounfold.methods.thesis import fit_thesis
+from geounfold.methods.thesis.method import fit_thesis
 from geounfold.methods.ufo import fit_ufo
+from geounfold.methods.vertical_heights import VerticalOptions
 from geounfold.methods.volumetric import VolumetricOptions, fit_volumetric
 
 __all__ = [
     "METHODS",
-    "Body",
     "BodyFit",
-    "IsomapOptions",
+    "IsomapMethodOptions",
     "Method",
     "Placed",
     "Pointwise",
     "PointwiseMap",
+    "PreparedBody",
     "SurfacePair",
     "VerticalOptions",
     "VolumetricOptions",
@@ -34,7 +34,7 @@ _FAR = 10.0  # blocks: meshes without a shell leave some blocks outside
 METHODS: dict[str, Method] = {
     m.name: m
     for m in (
-        Method("sheet", fit_sheet, "sheet_options"),
+        Method("sheet", sheet_method, "sheet_options"),
         Method("thesis", fit_thesis, "thesis_options", reach=_FAR, hull="alpha", surfaces=False),
         Method("ufo", fit_ufo, "sheet_options", reach=_FAR),
         Method(

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from geounfold.coarse import Coarse
-from geounfold.control import ControlMesh
+from geounfold.body.merged_blocks import Coarse
+from geounfold.body.working_frame import Frame
 from geounfold.flattening import Flattening, flatten
-from geounfold.frame import Frame
-from geounfold.geometry import face_normals, triangle_areas
-from geounfold.hull import Hull
-from geounfold.mesh import Bools, Floats, Space, TriMesh, in_space
-from geounfold.sheet import SheetOptions, SheetResult
-from geounfold.split import SurfaceSplit
+from geounfold.geometry.measures import face_normals, triangle_areas
+from geounfold.geometry.mesh import Bools, Floats, Space, TriMesh, in_space
+from geounfold.mapping.control_mesh import ControlMesh
+from geounfold.methods.sheet.options import SheetOptions
+from geounfold.methods.sheet.stages import SheetResult
+from geounfold.surfaces.hull import Hull
+from geounfold.surfaces.split.result import SurfaceSplit
 
 if TYPE_CHECKING:
     import pyvista
 
+
 Stage = Callable[[str], AbstractContextManager[None]]
 """``with stage("hull"):`` times a stage and shows its name."""
 
-OTHER_SIDE = {"top": "bottom", "bottom": "top"}
-
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PreparedBody:
     """What a method is given of one body, in working units.
 
     Attributes
@@ -112,33 +112,6 @@ class Pointwise(Protocol):
 
     def to_folded(self, points: Floats) -> Floats:
         """Return flat points (n, 3) in the folded space, NaN where there is no place."""
-
-
-@dataclass(frozen=True, eq=False)
-class TurnedOver:
-    """A pointwise map with top and bottom exchanged: the flat space turned about its x axis."""
-
-    rule: Pointwise
-
-    @property
-    def way_back(self) -> bool:
-        """As the rule's."""
-        return self.rule.way_back
-
-    def to_flat(self, points: Floats) -> Placed:
-        """Place folded points as the rule does, then turn them over."""
-        placed = self.rule.to_flat(points)
-        return Placed(turned(placed.points), 1 - placed.stratigraphic, placed.anchored)
-
-    def to_folded(self, points: Floats) -> Floats:
-        """Turn flat points back over, then carry them as the rule does."""
-        return self.rule.to_folded(turned(points))
-
-
-def turned(V: Floats) -> Floats:
-    """Return flat points (n, 3) turned about the x axis by half a turn: never mirrored."""
-    out: Floats = V * np.array([1.0, -1.0, -1.0])
-    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +208,7 @@ class Method:
     """
 
     name: str
-    fit: Callable[[Body], BodyFit]
+    fit: Callable[[PreparedBody], BodyFit]
     options: str
     control: bool = True
     reach: float | None = None
@@ -257,39 +230,8 @@ def level(mesh: TriMesh, uv: Floats, z: float) -> TriMesh:
     return mesh.with_vertices(np.column_stack([uv, np.full(len(uv), z)]))
 
 
-def _over_control(control: ControlMesh) -> ControlMesh:
-    return ControlMesh(
-        control.folded,
-        control.unfolded.with_vertices(turned(control.unfolded.V)),
-        1 - control.stratigraphic,
-    )
-
-
-def turned_over(fit: BodyFit) -> BodyFit:
-    """Return the fit with top and bottom exchanged: the flat space turned about its x axis."""
-    notes = dict(fit.notes)
-    if "layers_follow" in notes:
-        notes["layers_follow"] = OTHER_SIDE.get(str(notes["layers_follow"]), "mid")
-    parts = fit.split
-    return replace(
-        fit,
-        split=replace(parts, side=-parts.side, flipped_up=not parts.flipped_up),
-        control=None if fit.control is None else _over_control(fit.control),
-        shell=None if fit.shell is None else _over_control(fit.shell),
-        surfaces={
-            OTHER_SIDE.get(name, name): replace(
-                pair, unfolded=pair.unfolded.with_vertices(turned(pair.unfolded.V))
-            )
-            for name, pair in fit.surfaces.items()
-        },
-        flattenings={OTHER_SIDE.get(name, name): f for name, f in fit.flattenings.items()},
-        notes=notes,
-        rule=None if fit.rule is None else TurnedOver(fit.rule),
-    )
-
-
 def by_rule(
-    body: Body,
+    body: PreparedBody,
     sheet: SheetResult,
     rule: Pointwise,
     folded: Mapping[str, TriMesh],

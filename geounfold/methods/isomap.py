@@ -11,13 +11,13 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from geounfold.errors import FlatteningError, InputError, OptionError
-from geounfold.flattening._landmarks import scaled
-from geounfold.geometry import vertex_normals
-from geounfold.mesh import Bools, Floats, Ints, TriMesh
-from geounfold.methods.contract import Body, BodyFit, Placed, by_rule
-from geounfold.methods.sheet import sheet_stages
-from geounfold.sheet import SheetResult
-from geounfold.sheet.build import register
+from geounfold.flattening._classical_scaling import scaled
+from geounfold.geometry.measures import vertex_normals
+from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.methods.contract import BodyFit, Placed, PreparedBody, by_rule
+from geounfold.methods.sheet.meshing.build import register
+from geounfold.methods.sheet.method import sheet_stages
+from geounfold.methods.sheet.stages import SheetResult
 
 _TIE = 1e-6  # of a distance: neighbours this equally far are all taken or all left
 _SPARE = 24  # neighbours asked for beyond those wanted, for ties
@@ -30,7 +30,7 @@ _HASH = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True)
-class IsomapOptions:
+class IsomapMethodOptions:
     """Options of ``isomap``; the numbers are Unfolding.jl's.
 
     Parameters
@@ -65,7 +65,7 @@ class IsomapOptions:
             raise OptionError(f"isomap: largest must be positive, but is {self.largest}")
 
 
-def fit_isomap(body: Body) -> BodyFit:
+def fit_isomap(body: PreparedBody) -> BodyFit:
     """Return the map of a body by landmark Isomap (Caixeta and Costa 2021).
 
     Points of the mid surface are joined with their nearest neighbours; the shortest paths along
@@ -89,7 +89,7 @@ def fit_isomap(body: Body) -> BodyFit:
     FlatteningError
         The graph falls apart, or has no two dimensions.
     """
-    options: IsomapOptions = body.options
+    options: IsomapMethodOptions = body.options
     sheet = sheet_stages(body, "mid", 0.0)
     mesh = sheet.mesh
     with body.stage("isomap"):
@@ -102,7 +102,7 @@ def fit_isomap(body: Body) -> BodyFit:
         return by_rule(body, sheet, rule, folded, {"reference": len(mid.V), "landmarks": count})
 
 
-def landmark_isomap(P: Floats, options: IsomapOptions) -> tuple[Floats, int]:
+def landmark_isomap(P: Floats, options: IsomapMethodOptions) -> tuple[Floats, int]:
     """Return points of a surface (n, 3) laid flat (n, 2), and the number of landmarks.
 
     Raises
@@ -161,7 +161,7 @@ def _onto(uv: Floats, mid: TriMesh, flat: Floats) -> Floats:
     return register(uv, flat, np.ones(len(uv)))
 
 
-def _placed(P: Floats, mid: TriMesh, uv: Floats, options: IsomapOptions) -> Floats:
+def _placed(P: Floats, mid: TriMesh, uv: Floats, options: IsomapMethodOptions) -> Floats:
     """Return the flat places of the mid surface's points and of blocks, (m + n, 3)."""
     known = np.column_stack([uv, np.zeros(len(uv))])
     flat = _first_guess(P, mid, known)
@@ -197,7 +197,7 @@ def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
     return out
 
 
-def _sound(P: Floats, flat: Floats, options: IsomapOptions) -> Bools:
+def _sound(P: Floats, flat: Floats, options: IsomapMethodOptions) -> Bools:
     """Return the points whose distances to their neighbours are off by no more than allowed."""
     near = np.asarray(cKDTree(P).query(P, k=options.near)[1], dtype=np.int64)
     out = np.ones(len(P), dtype=bool)
@@ -293,7 +293,7 @@ class NeighbourRule:
 
     known: Floats
     placed: Floats
-    options: IsomapOptions
+    options: IsomapMethodOptions
     sheet: SheetResult = field(repr=False)
 
     way_back = False

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from geounfold.methods.contract import Body, BodyFit, by_rule
-from geounfold.methods.heights import vertical_rule, vertical_warnings
-from geounfold.methods.sheet import sheet_stages
+from geounfold.methods.contract import BodyFit, PreparedBody, by_rule
+from geounfold.methods.sheet.method import sheet_stages
+from geounfold.methods.vertical_heights import vertical_rule, vertical_warnings
 
 
-def fit_shear(body: Body) -> BodyFit:
+def fit_shear(body: PreparedBody) -> BodyFit:
     """Return the map that keeps x and y and takes from z the height of a reference surface.
 
     The reference lies midway, along the vertical, between top and bottom; ``datum`` moves it to
@@ -23,7 +23,7 @@ def fit_shear(body: Body) -> BodyFit:
     return vertical_fit(body, body.datum)
 
 
-def vertical_fit(body: Body, datum: str) -> BodyFit:
+def vertical_fit(body: PreparedBody, datum: str) -> BodyFit:
     """Return the map by vertical coordinates with a datum (see VerticalRule)."""
     sheet = sheet_stages(body, "mid", 0.0)
     with body.stage("heights"):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from geounfold.methods.contract import Body, BodyFit
+from geounfold.methods.contract import BodyFit, PreparedBody
 from geounfold.methods.shear import vertical_fit
 
 
-def fit_stratigraphic(body: Body) -> BodyFit:
+def fit_stratigraphic(body: PreparedBody) -> BodyFit:
     """Return the map that keeps x and y and makes z the proportional height.
 
     ``z = (share - 1/2) T`` with ``share = (height - bottom) / (top - bottom)`` along the vertical

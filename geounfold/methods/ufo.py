@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.control import ControlMesh, Datum
-from geounfold.mesh import Floats, TetMesh, TriMesh
-from geounfold.methods.contract import Body, BodyFit, SurfacePair
-from geounfold.methods.sheet import sheet_stages
-from geounfold.sheet import SheetResult
+from geounfold.geometry.mesh import Floats, TetMesh, TriMesh
+from geounfold.mapping.control_mesh import ControlMesh, Datum
+from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair
+from geounfold.methods.sheet.method import sheet_stages
+from geounfold.methods.sheet.stages import SheetResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class AnchoredSheet:
         return out
 
 
-def fit_ufo(body: Body) -> BodyFit:
+def fit_ufo(body: PreparedBody) -> BodyFit:
     """Return the map that keeps each block's place on the reference surface and its height.
 
     The reference is the mid surface that ``sheet`` fits, laid flat by the chosen flattener.  A
@@ -93,7 +93,7 @@ def fit_ufo(body: Body) -> BodyFit:
     )
 
 
-def anchor(body: Body) -> AnchoredSheet:
+def anchor(body: PreparedBody) -> AnchoredSheet:
     """Return the body's mid surface laid flat, and the prisms that stand on it."""
     sheet = sheet_stages(body, "mid", 0.0)
     layers, surfaces = sheet.mesh.layers, sheet.mesh.surfaces

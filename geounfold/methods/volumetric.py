@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from geounfold.backends.igl import upright
-from geounfold.backends.injective import SlimTets
-from geounfold.control import ControlMesh, Datum
+from geounfold.backends.slim_scaf import SlimTets
 from geounfold.errors import BackendError, FlatteningError, OptionError
-from geounfold.mesh import Floats, TetMesh, TriMesh
-from geounfold.methods.contract import Body, BodyFit, SurfacePair
+from geounfold.geometry.mesh import Floats, TetMesh, TriMesh
+from geounfold.mapping.control_mesh import ControlMesh, Datum
+from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair
 from geounfold.methods.ufo import AnchoredSheet, anchor
 
 
@@ -43,7 +43,7 @@ class VolumetricOptions:
                 raise OptionError(f"volumetric: {name} must be positive, but is {value}")
 
 
-def fit_volumetric(body: Body) -> BodyFit:
+def fit_volumetric(body: PreparedBody) -> BodyFit:
     """Return the map of least volumetric strain between flat top and bottom.
 
     The prisms over the mid surface (those of ``ufo``, from whose map it starts) deform so that

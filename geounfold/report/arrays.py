@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.mesh import Floats
-from geounfold.plotting import level_step
+from geounfold.geometry.mesh import Floats
+from geounfold.report.plots.rendering import level_step
 
 _LEVELS = 65534  # the highest code of 16 bits; one more stands for no value
 

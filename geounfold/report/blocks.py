@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
-from geounfold.blockmodel.sizes import size_columns
+from geounfold.body.lattice import measure_lattice, point_spacing
 from geounfold.errors import InputError
-from geounfold.lattice import measure_lattice, point_spacing
-from geounfold.mesh import Bools, Floats, Ints
-from geounfold.plotting import block_sides
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.block_sizes import size_columns
 from geounfold.report.columns import read_columns
+from geounfold.report.plots.rendering import block_sides
 
 LIMIT = 50_000
 """Blocks that a report holds at most."""

@@ -10,9 +10,9 @@ import numpy as np
 from scipy import ndimage
 
 from geounfold.errors import InputError
-from geounfold.mesh import Floats
-from geounfold.plotting import colour_limits
-from geounfold.report.words import text
+from geounfold.geometry.mesh import Floats
+from geounfold.report.html_text import text
+from geounfold.report.plots.figures import colour_limits
 
 _WIDTH, _HEIGHT = 400, 250
 _LEFT, _RIGHT, _TOP, _BOTTOM = 54, 14, 12, 46

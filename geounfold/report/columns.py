@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from geounfold.mesh import Floats, Ints
-from geounfold.plotting import colour_limits, ratio_limits
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.report.arrays import encoded, quantised
+from geounfold.report.plots.figures import colour_limits, ratio_limits
 
 MOST_CATEGORIES = 250
 """Different texts that a column may have to be kept."""

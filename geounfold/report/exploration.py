@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.report.words import number, table, text
+from geounfold.report.html_text import number, table, text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,8 +28,8 @@ def exploration_html(exploration: Exploration) -> str:
     exploration : Exploration
         Of samples that were carried with the body.
     """
-    from geounfold.charts import charts
     from geounfold.estimation.exploration import statistics
+    from geounfold.report.plots.grades import charts
 
     told = _told(exploration)
     drawn = {name: _drawn(figure, told[name]) for name, figure in charts(exploration).items()}
@@ -137,7 +137,7 @@ def _model(space: str, fitted: FittedVariogram) -> dict[str, Any]:
 
 
 def _drawn(figure: Figure, caption: str) -> str:
-    from geounfold.plotting import svg
+    from geounfold.report.plots.figures import svg
 
     data, words = base64.b64encode(svg(figure)).decode("ascii"), text(caption)
     return (

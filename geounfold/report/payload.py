@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.mesh import Floats, Ints
-from geounfold.plotting import ViewOptions, block_sides, require
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.report.arrays import encoded, floating_points, quantised_points
 from geounfold.report.blocks import block_shape, chosen_blocks, gradients, outer_blocks
 from geounfold.report.columns import Column, read_columns
+from geounfold.report.plots.rendering import block_sides
+from geounfold.report.plots.style import ViewOptions, require
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

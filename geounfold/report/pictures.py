@@ -6,10 +6,12 @@ import base64
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from geounfold.mesh import Floats
-from geounfold.plotting import ViewOptions, draw_bodies, png, ratio_limits
+from geounfold.geometry.mesh import Floats
 from geounfold.report.columns import MEANINGS
-from geounfold.report.words import text
+from geounfold.report.html_text import text
+from geounfold.report.plots.bodies import draw_bodies
+from geounfold.report.plots.figures import png, ratio_limits
+from geounfold.report.plots.style import ViewOptions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

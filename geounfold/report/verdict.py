@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from geounfold.report.words import mapping, number
+from geounfold.report.html_text import mapping, number
 
 _CARE = 0.001  # share of blocks outside the control mesh from which the verdict asks for care
 _BENT = 0.1  # change of neighbour distances that the thesis counts as an error (section 3.5)

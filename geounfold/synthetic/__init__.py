@@ -1,8 +1,9 @@
 """Simulated bodies and surfaces whose unfolding is known exactly."""
 
-from geounfold.synthetic.body import Body, FoldSpec, Sheet
+from geounfold.synthetic.body import Body, Sheet
 from geounfold.synthetic.catalogue import CASES, simulate
 from geounfold.synthetic.drilling import PATTERNS, DrilledTables, drill
+from geounfold.synthetic.fold_spec import FoldSpec
 from geounfold.synthetic.grades import FIELD_KINDS, GradeField
 from geounfold.synthetic.outline import (
     Bulge,
@@ -19,7 +20,8 @@ from geounfold.synthetic.outline import (
     Wedge,
 )
 from geounfold.synthetic.profile import Bend, Bump, FlexuralSlip, Profile, Sinusoid
-from geounfold.synthetic.recipes import FAMILIES, random_body, random_family
+from geounfold.synthetic.random_bodies import random_body, random_family
+from geounfold.synthetic.random_families import FAMILIES
 from geounfold.synthetic.surfaces import AnalyticSurface, cone, cylinder, slab, spherical_cap
 
 __all__ = [

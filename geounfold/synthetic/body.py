@@ -3,241 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Bools, Floats, TriMesh
-from geounfold.synthetic.outline import Even, Place, Region, Thickness
-from geounfold.synthetic.profile import FlexuralSlip, Profile, require_finite, require_positive
-
-GRIDS = ("before", "after", "scattered")
-
-
-def rotation(bearing: float, plunge: float, dip: float) -> Floats:
-    """Return axes (3, 3) turned as block models are: rows x, y, z in world coordinates.
-
-    Parameters
-    ----------
-    bearing : float
-        Of the y axis, degrees clockwise from north (world +y).
-    plunge : float
-        Of the y axis, degrees below the horizontal.
-    dip : float
-        Degrees by which the x axis then turns downwards about the y axis.
-
-    Examples
-    --------
-    >>> rotation(90, 0, 0).round(12)[1].tolist()
-    [1.0, 0.0, 0.0]
-    """
-    (a, b, c), (sa, sb, sc) = (f(np.radians([bearing, plunge, dip])) for f in (np.cos, np.sin))
-    turn = np.array([[a, -sa, 0.0], [sa, a, 0.0], [0.0, 0.0, 1.0]])
-    tip = np.array([[1.0, 0.0, 0.0], [0.0, b, -sb], [0.0, sb, b]])
-    roll = np.array([[c, 0.0, -sc], [0.0, 1.0, 0.0], [sc, 0.0, c]])
-    out: Floats = roll @ tip @ turn
-    return out
-
-
-@dataclass(frozen=True, kw_only=True)
-class FoldSpec:
-    """A recipe of a simulated body.  Lengths are in one unit of the user's, say metres.
-
-    Parameters
-    ----------
-    description : str
-        One line for lists.
-    profile : Profile
-        Heading of the mid surface along arc length, in the section across the fold axis.
-    length, width : float
-        The sheet's extent before folding, across and along the fold axis.
-    thickness : float, Even, Lens, Swell, Wedge or Bulge
-        Heights of bottom and top about the mid surface.
-    outline : tuple of regions
-        Ellipse, Hole, Ragged, Embayment, ObliqueCut, Neck, Gap; the body lies in all of them.
-    steps : (float, float, float)
-        Block sides along the lattice's axes; of scattered points, one for each such block's volume.
-    grid : {'before', 'after', 'scattered'}
-        Blocks are regular before folding, or after it (as a block model's are), or points are
-        scattered at random without a lattice.
-    azimuth, plunge, tilt : float
-        Of the fold axis, as bearing, plunge and dip of ``rotation``; degrees.
-    lattice_bearing, lattice_plunge, lattice_dip : float
-        Of the lattice of a body gridded after folding, as in ``rotation``; degrees.
-    offset : (float, float, float)
-        World coordinates of the fold's and the lattice's origin.
-    noise : float
-        Standard deviation added to each folded coordinate, in block sides; the truth has none.
-    missing : float
-        Share of the blocks left out at random.
-    seed : int
-        Of noise and missing blocks.
-    pin : float or None
-        Heading, degrees, at which layers do not slip; None for the mean heading.
-    origin : float
-        Arc length whose mid-surface point is the origin.
-    refold : Profile or None
-        A second fold, about the axis across the first one.  No exact flattening exists then;
-        the truth keeps volume, not lengths.
-    sub_blocks : {1, 2, 4, 8}
-        Blocks that the body's surface crosses are halved along every axis, and halved again
-        until so many stand on a side: ``steps`` are those of the parent blocks then.
-    density : float
-        Of scattered points: the highest over the lowest, from 1 up.
-    closed : bool
-        The profile ends where it starts, as a tube's does, and the body is whole there.  No flat
-        image exists without a cut; the truth is that of the tube cut along the normals there.
-
-    Raises
-    ------
-    OptionError
-        A value outside its valid ones.
-    """
-
-    description: str
-    profile: Profile
-    length: float
-    width: float
-    thickness: Thickness | float
-    outline: tuple[Region, ...] = ()
-    steps: tuple[float, float, float] = (10.0, 10.0, 10.0)
-    grid: str = "after"
-    azimuth: float = 0.0
-    plunge: float = 0.0
-    tilt: float = 0.0
-    lattice_bearing: float = 0.0
-    lattice_plunge: float = 0.0
-    lattice_dip: float = 0.0
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    noise: float = 0.0
-    missing: float = 0.0
-    seed: int = 0
-    pin: float | None = None
-    origin: float = 0.0
-    refold: Profile | None = None
-    sub_blocks: int = 1
-    density: float = 1.0
-    closed: bool = False
-
-    def __post_init__(self) -> None:
-        require_positive("length", self.length)
-        require_positive("width", self.width)
-        self._check_triples()
-        for name in ("azimuth", "plunge", "tilt", "noise", "missing", "origin"):
-            require_finite(name, getattr(self, name))
-        for name in ("lattice_bearing", "lattice_plunge", "lattice_dip"):
-            require_finite(name, getattr(self, name))
-        if self.grid not in GRIDS:
-            raise OptionError(f"grid {self.grid!r} is not one of: {', '.join(GRIDS)}")
-        if self.noise < 0:
-            raise OptionError(f"noise must not be negative, but is {self.noise!r}")
-        if not 0 <= self.missing < 1:
-            raise OptionError(f"missing is a share and must lie in [0, 1), not {self.missing!r}")
-        if self.pin is not None:
-            require_finite("pin", self.pin)
-        if not isinstance(self.seed, int) or self.seed < 0:
-            raise OptionError(f"seed must be a whole number from 0 up, not {self.seed!r}")
-        self._check_parts()
-        self._check_grid()
-
-    def _check_grid(self) -> None:
-        if self.sub_blocks not in (1, 2, 4, 8):
-            raise OptionError(f"sub_blocks is not one of: 1, 2, 4, 8, but {self.sub_blocks!r}")
-        if self.sub_blocks != 1 and self.grid != "after":
-            raise OptionError(f"sub_blocks need the grid 'after', not {self.grid!r}")
-        require_finite("density", self.density)
-        if self.density < 1:
-            raise OptionError(f"density is a ratio and must be 1 or more, not {self.density!r}")
-        if self.density != 1 and self.grid != "scattered":
-            raise OptionError(f"a density needs the grid 'scattered', not {self.grid!r}")
-        plain = self.grid == "after" and self.refold is None and isinstance(self.shape, Even)
-        if self.closed and not plain:
-            raise OptionError("a closed body must be gridded after one fold and evenly thick")
-
-    def _check_parts(self) -> None:
-        for name in ("profile", "refold"):
-            value = getattr(self, name)
-            if not (isinstance(value, Profile) or (name == "refold" and value is None)):
-                raise OptionError(f"{name} must be a Profile, not {value!r}")
-        if not hasattr(self.thickness, "heights"):
-            require_positive("thickness", self.thickness)
-        if not all(hasattr(region, "keeps") for region in self.outline):
-            raise OptionError(f"outline must be a tuple of regions, not {self.outline!r}")
-
-    def _check_triples(self) -> None:
-        for name in ("steps", "offset"):
-            values = getattr(self, name)
-            if np.shape(values) != (3,):
-                raise OptionError(f"{name} must be three numbers, not {values!r}")
-            for value in values:
-                (require_positive if name == "steps" else require_finite)(name, value)
-
-    @property
-    def shape(self) -> Thickness:
-        """The thickness as heights of bottom and top."""
-        if isinstance(self.thickness, (int, float)):
-            return Even(float(self.thickness))
-        return self.thickness
-
-    @property
-    def developable(self) -> bool:
-        """Whether an exact flattening exists: unless folded twice, or closed."""
-        twice = self.refold is not None and self.refold.elements and self.profile.elements
-        return not (twice or self.closed)
-
-    def with_options(self, **overrides: object) -> FoldSpec:
-        """Return a copy with other values of some fields, or OptionError naming the valid ones."""
-        names = [f.name for f in fields(self)]
-        for name in overrides:
-            if name not in names:
-                raise OptionError(
-                    f"unknown option {name!r} of a simulated body; valid: blocks, "
-                    + ", ".join(names)
-                )
-        return replace(self, **overrides)  # type: ignore[arg-type]
-
-    def with_blocks(self, blocks: int) -> FoldSpec:
-        """Return the body grown or shrunk in its plane to hold about so many blocks.
-
-        Length and width are scaled; sinusoids go on, bends and bumps are stretched.  Of a
-        sub-blocked body the parents are counted, those at the surface by their part of a block.
-        """
-        require_positive("blocks", blocks)
-        spec = self
-        for _ in range(3):
-            factor = float(np.sqrt(blocks * np.prod(spec.steps) / volume(spec)))
-            spec = replace(
-                spec,
-                length=spec.length * factor,
-                width=spec.width * factor,
-                profile=spec.profile.stretched(factor),
-                refold=spec.refold and spec.refold.stretched(factor),
-            )
-        return spec
-
-
-def volume(spec: FoldSpec) -> float:
-    """Return the body's volume, by the midpoint rule over the sheet."""
-    n = 400
-    a, b = ((g.ravel() + 0.5) / n for g in np.meshgrid(*[np.arange(n)] * 2, indexing="ij"))
-    low, high = spec.shape.heights(a, b)
-    thick = np.where(_kept(spec, a * spec.length, b * spec.width, np.zeros(len(a))), high - low, 0)
-    out = float(thick.mean() * spec.length * spec.width)
-    if out <= 0:
-        raise OptionError("the outline leaves nothing of the body")
-    return out
-
-
-def _kept(spec: FoldSpec, u: Floats, v: Floats, w: Floats) -> Bools:
-    """Return which points, (n,), lie in the rectangle and in all regions of the outline."""
-    place = Place(u, v, w, spec.length, spec.width)
-    out: Bools = (u >= 0) & (u <= spec.length) & (v >= 0) & (v <= spec.width)
-    for region in spec.outline:
-        out &= region.keeps(place)
-    return out
+from geounfold.geometry.mesh import Bools, Floats, TriMesh
+from geounfold.geometry.rotations import rotation_from_angles
+from geounfold.synthetic.fold_spec import FoldSpec, keeps
+from geounfold.synthetic.outline import Even, Thickness
+from geounfold.synthetic.profile import FlexuralSlip, require_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +44,7 @@ class Sheet:
     @cached_property
     def axes(self) -> Floats:
         """The fold's axes x, y, z as rows, (3, 3), in world coordinates."""
-        return rotation(self.spec.azimuth, self.spec.plunge, self.spec.tilt)
+        return rotation_from_angles(self.spec.azimuth, self.spec.plunge, self.spec.tilt)
 
     @cached_property
     def lattice_axes(self) -> Floats:
@@ -275,7 +52,7 @@ class Sheet:
         s = self.spec
         if s.grid == "before":
             return self.axes
-        return rotation(s.lattice_bearing, s.lattice_plunge, s.lattice_dip)
+        return rotation_from_angles(s.lattice_bearing, s.lattice_plunge, s.lattice_dip)
 
     @cached_property
     def slip(self) -> FlexuralSlip:
@@ -311,7 +88,7 @@ class Sheet:
         low, high = self.heights(u, v)
         # A closed sheet ends at normals: the part of the length whose normal a point stands on.
         along = self.slip.arc_length(u, w) if self.spec.closed else u
-        out: Bools = _kept(self.spec, along, v, w) & (w >= low) & (w <= high)
+        out: Bools = keeps(self.spec, along, v, w) & (w >= low) & (w <= high)
         return out
 
     def heights(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -506,7 +283,7 @@ class Body:
         heights = self.sheet.heights(u, v)
         w = heights[side == "top"]
         truth = self.sheet.over(u, v, w)
-        kept = _kept(spec, u, v, w) & (heights[1] > heights[0])
+        kept = keeps(spec, u, v, w) & (heights[1] > heights[0])
         k = np.arange(len(truth)).reshape(n, m)
         p, q, r, s = k[:-1, :-1].ravel(), k[1:, :-1].ravel(), k[1:, 1:].ravel(), k[:-1, 1:].ravel()
         F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])

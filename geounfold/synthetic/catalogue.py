@@ -8,7 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.synthetic.body import Body, FoldSpec
+from geounfold.synthetic.body import Body
+from geounfold.synthetic.fold_spec import FoldSpec
 from geounfold.synthetic.outline import (
     Bulge,
     Ellipse,

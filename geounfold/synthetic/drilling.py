@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 from geounfold.synthetic.body import Body
 from geounfold.synthetic.grades import GradeField
 from geounfold.synthetic.profile import require_finite, require_positive

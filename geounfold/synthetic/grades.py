@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats
+from geounfold.geometry.mesh import Floats
 from geounfold.synthetic.profile import require_finite, require_positive
 
 FIELD_KINDS = ("spherical", "exponential", "gaussian")

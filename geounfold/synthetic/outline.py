@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Bools, Floats
+from geounfold.geometry.mesh import Bools, Floats
 from geounfold.synthetic.profile import require_finite, require_positive
 
 SIDES = ("u0", "u1", "v0", "v1")

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _SMOOTH_PEAK = 15 / 8  # largest slope of the quintic smoothstep

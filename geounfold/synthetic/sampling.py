@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Bools, Floats, Ints
-from geounfold.synthetic.body import Body, FoldSpec, Sheet, volume
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.synthetic.body import Body, Sheet
+from geounfold.synthetic.fold_spec import FoldSpec, volume
 
 _CHUNK = 400_000  # candidates handled at a time: bounds the memory beside the result
 

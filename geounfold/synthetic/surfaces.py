@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.mesh import Floats, Ints, TriMesh
+from geounfold.geometry.mesh import Floats, Ints, TriMesh
 from geounfold.synthetic.profile import require_finite, require_positive
 
 

@@ -39,10 +39,10 @@ import numpy as np
 import pandas as pd
 
 import geounfold as gu
-from geounfold.distortion import deformation_gradients
-from geounfold.geometry import triangle_areas
-from geounfold.mapping import UnfoldingMap
-from geounfold.options import UnfoldOptions
+from geounfold.geometry.measures import triangle_areas
+from geounfold.mapping.distortion import deformation_gradients
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.unfolding.options import UnfoldOptions
 
 BODIES = ("sim_case_1", "sim_case_2", "plunging", "steep", "recumbent", "lens", "refolded", "dome")
 PLANE = 1e-9  # distance of a quadrilateral's corners from a plane, over the prism's size

@@ -44,10 +44,10 @@ from geounfold.backends.igl import ArapSteps, face_components
 from geounfold.errors import GeounfoldError
 from geounfold.flattening import FLATTENERS, ArapOptions, SpringOptions, flatten, measures
 from geounfold.flattening._problem import Problem, displacement, make_problem, upright
-from geounfold.flattening.initial import check_disk, tutte
-from geounfold.geometry import lengths
+from geounfold.flattening._start import check_disk, tutte
+from geounfold.geometry.measures import lengths
+from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.io import read_surface, write_table
-from geounfold.mesh import Floats, TriMesh
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SIZES = (1_000, 10_000, 100_000)

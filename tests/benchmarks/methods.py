@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 
 import geounfold as gu
-from geounfold.contest import compare_methods
+from geounfold.comparison.methods import compare_methods
 from geounfold.methods import METHODS
-from geounfold.quality import neighbours
+from geounfold.quality.neighbour_distances import neighbours
 from geounfold.synthetic import CASES
 
 LARGE = ("large", "thin_wide")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from geounfold.cli.console import Console
-from geounfold.cli.endings import TOML
+from geounfold.cli.file_endings import TOML
+from geounfold.cli.terminal.console import Console
 from geounfold.io import Outputs
 
 
@@ -14,7 +14,7 @@ def init(args: Namespace, console: Console) -> None:
     outputs = Outputs.planned(
         {"--output": (args.output, TOML)}, overwrite=args.overwrite, watcher=console.journal
     )
-    from geounfold.config import template
+    from geounfold.unfolding.options_toml import template
 
     if args.output is None:
         console.say(template())
@@ -27,7 +27,7 @@ def init(args: Namespace, console: Console) -> None:
 
 def doctor(args: Namespace, console: Console) -> None:
     """Say what is installed and whether it works."""
-    from geounfold.cli.checkup import check_up, healthy, in_words
+    from geounfold.cli.doctor import check_up, healthy, in_words
 
     found = check_up(console.stage)
     console.done("checked")
@@ -37,6 +37,6 @@ def doctor(args: Namespace, console: Console) -> None:
 
 def completion(args: Namespace, console: Console) -> None:
     """Print what teaches a shell to complete the command line."""
-    from geounfold.cli.completion import script
+    from geounfold.cli.terminal.completion import script
 
     console.say(script(args.shell))

@@ -10,22 +10,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from geounfold.cli.choices import whole_number
-from geounfold.cli.console import Console
-from geounfold.cli.endings import JSON, POINTS_OUT
-from geounfold.cli.frames import model_axes, model_frame, three_numbers
-from geounfold.cli.sides import columns_or_lengths
+from geounfold.cli.file_endings import JSON, POINTS_OUT
+from geounfold.cli.inputs.block_sizes import columns_or_lengths
+from geounfold.cli.inputs.model_frame import model_axes, model_frame, three_numbers
+from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, read_points, write_json
-from geounfold.io.coordinates import Triple, parse_columns
-from geounfold.io.points import Place
-from geounfold.io.results import UNFOLDED, world_columns
-from geounfold.io.tables import TABLE_ENDINGS, existing_file, write_table
+from geounfold.io.coordinate_columns import Triple, parse_columns
+from geounfold.io.paths import TABLE_ENDINGS, existing_file
+from geounfold.io.result_columns import UNFOLDED, world_columns
+from geounfold.io.tables.files import write_table
+from geounfold.io.tables.points import Place
 
 if TYPE_CHECKING:
-    from geounfold.blockmodel import BlockModel, Transfer
-    from geounfold.mapping import UnfoldingMap
-    from geounfold.mesh import Bools, Floats
+    from geounfold.body.block_model import BlockModel
+    from geounfold.estimation.transfer import Transfer
+    from geounfold.geometry.mesh import Bools, Floats
+    from geounfold.mapping.mesh_map import UnfoldingMap
 
 _SPACES = ("folded", "unfolded")
 
@@ -44,13 +46,13 @@ def grid(args: Namespace, console: Console) -> None:
     table = _read_blocks(
         args.points, args.columns, (UNFOLDED,), args=args, console=console, gaps=True
     )
-    from geounfold import mapping
-    from geounfold.blockmodel import regular_grid
+    from geounfold.body.block_model import regular_grid
+    from geounfold.mapping import mesh_map
 
     console.stage("making the grid")
     blocks = regular_grid(table.points, np.array(sides))
     if args.map is not None:
-        saved = mapping.load(args.map)
+        saved = mesh_map.load(args.map)
         console.stage("finding the blocks in the body")
         held = _held(saved, blocks)
         if not held.any():
@@ -93,10 +95,10 @@ def transfer(args: Namespace, console: Console) -> None:
     target.check_writable(args.output)
     values = np.column_stack([source.numbers(name) for name in names])
     axes = model_axes(args.rotation) if frame is None else frame.axes
-    from geounfold import mapping
-    from geounfold.blockmodel import transfer as moved
+    from geounfold.estimation.transfer import transfer as moved
+    from geounfold.mapping import mesh_map
 
-    saved = mapping.load(args.map)
+    saved = mesh_map.load(args.map)
     level = np.eye(3)
     from_blocks = _blocks(source, args.source_sizes, level if back else axes)
     to_blocks = _blocks(target, args.target_sizes, axes if back else level)
@@ -144,7 +146,7 @@ def _facts(names: list[str], result: Transfer) -> dict[str, Any]:
 
 def _held(saved: UnfoldingMap, blocks: BlockModel) -> Bools:
     """Return which blocks of the flat space have a part in the control mesh, (n,)."""
-    from geounfold.threads import slices
+    from geounfold.backends.threads import slices
 
     held = np.zeros(len(blocks), dtype=bool)
     for rows in slices(len(blocks), 1 << 15):
@@ -186,7 +188,7 @@ def _value_columns(text: str, source: PointTable) -> list[str]:
 
 def _blocks(table: PointTable, sizes: str | None, axes: Floats | None) -> BlockModel:
     """Return a table's blocks; `sizes` are three columns or three lengths."""
-    from geounfold.blockmodel import block_model
+    from geounfold.io.block_sizes import block_model
 
     given = None if sizes is None else columns_or_lengths(sizes)
     return block_model(table.frame, table.points, given, axes, source=table.source)

@@ -5,16 +5,17 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
-from geounfold.cli.choices import MODEL_OPTIONS, config_file, listed, unfold_options
-from geounfold.cli.console import Console
-from geounfold.cli.reading import TRUE, files_given, read, triple
-from geounfold.cli.table import table_text
+from geounfold.cli.answers.table import table_text
+from geounfold.cli.inputs.points import TRUE, files_given, read, triple
+from geounfold.cli.inputs.unfold_options import MODEL_OPTIONS, config_file, listed, unfold_options
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, holds_surface, read_points, read_surface
-from geounfold.io.tables import TABLE_ENDINGS, write_table
+from geounfold.io.paths import TABLE_ENDINGS
+from geounfold.io.tables.files import write_table
 
 if TYPE_CHECKING:
-    from geounfold.mesh import Floats, TriMesh
+    from geounfold.geometry.mesh import Floats, TriMesh
 
 
 def compare(args: Namespace, console: Console) -> None:
@@ -39,11 +40,11 @@ def compare(args: Namespace, console: Console) -> None:
         given = table.points
         if args.truth is not None:
             how["truth"] = _truth(args, len(table), console)
-    from geounfold import comparison
+    from geounfold.comparison import flatteners
 
     every = "all" if args.methods is None else None
     names = every if args.flatteners is None else listed(args.flatteners)
-    frame = comparison.compare(given, names, **how)
+    frame = flatteners.compare(given, names, **how)
     with outputs.writing() as parts:
         write_table(parts["--output"], frame)
     for _, row in frame[frame["error"] != ""].iterrows():

@@ -6,12 +6,13 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from geounfold.cli.choices import command_line, config_file, unfold_options
-from geounfold.cli.console import Console
-from geounfold.cli.endings import JSON, POINTS_OUT
-from geounfold.cli.reading import files_given, read
+from geounfold.cli.file_endings import JSON, POINTS_OUT
+from geounfold.cli.inputs.points import files_given, read
+from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
+from geounfold.cli.terminal.console import Console
 from geounfold.io import Outputs, write_json
-from geounfold.io.tables import TABLE_ENDINGS, ending, write_table
+from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.tables.files import write_table
 
 
 def crosscheck(args: Namespace, console: Console) -> None:
@@ -28,8 +29,9 @@ def crosscheck(args: Namespace, console: Console) -> None:
     table = read(args.points, args, console)
     if args.differences is not None:
         table.check_writable(args.differences)
-    from geounfold import pipeline, verification
-    from geounfold.cli.figures import crosscheck_lines
+    from geounfold.cli.answers.figures import crosscheck_lines
+    from geounfold.comparison import crosscheck
+    from geounfold.unfolding import run
 
     given = {"meshers": args.meshers, "interiors": args.interiors}
     named: dict[str, Any] = {
@@ -37,9 +39,9 @@ def crosscheck(args: Namespace, console: Console) -> None:
         for name, words in given.items()
         if words is not None
     }
-    chosen = verification.CrossCheckOptions(**named)
-    result = pipeline.unfold(table.points, unfold_options(args), progress=console.stage)
-    check = verification.crosscheck(result, chosen, progress=console.stage)
+    chosen = crosscheck.CrossCheckOptions(**named)
+    result = run.unfold(table.points, unfold_options(args), progress=console.stage)
+    check = crosscheck.crosscheck(result, chosen, progress=console.stage)
     facts = {**check.as_dict(), "input": table.facts(), "command": command_line(args)}
     console.stage("writing")
     with outputs.writing() as parts:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from geounfold.cli.choices import command_line
-from geounfold.cli.console import Console
-from geounfold.cli.endings import JSON, POINTS_OUT
-from geounfold.cli.reading import files_given, read, read_samples
+from geounfold.cli.file_endings import JSON, POINTS_OUT
+from geounfold.cli.inputs.points import files_given, read, read_samples
+from geounfold.cli.inputs.unfold_options import command_line
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import OptionError
 from geounfold.io import Outputs, write_json
-from geounfold.io.tables import existing_file
+from geounfold.io.paths import existing_file
 
 
 def estimate(args: Namespace, console: Console) -> None:
     """Estimate a grade on blocks from samples, in the unfolded space of a saved map."""
-    from geounfold.cli.estimating import estimation, summarised
+    from geounfold.cli.inputs.estimation import estimation, summarised
 
     outputs = Outputs.planned(
         {"--output": (args.output, POINTS_OUT), "--summary": (args.summary, JSON)},

@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.cli.console import Console
-from geounfold.cli.endings import POINTS_OUT, SURFACES_OUT
-from geounfold.cli.frames import model_frame
-from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
-from geounfold.cli.places import flat_columns, place_counts, warn_of_outside
-from geounfold.cli.reading import files_given, open_table, triple
+from geounfold.cli.answers.locations import flat_columns, place_counts, warn_of_outside
+from geounfold.cli.file_endings import POINTS_OUT, SURFACES_OUT
+from geounfold.cli.inputs.drillholes import TRACE_ENDINGS, check_hole_options, read_holes
+from geounfold.cli.inputs.model_frame import model_frame
+from geounfold.cli.inputs.points import files_given, open_table, triple
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError, OutputError
 from geounfold.io import Outputs, holds_surface, write_surface
-from geounfold.io.results import FOLDED, UNFOLDED, result_columns, world_columns
+from geounfold.io.paths import ending, existing_file
+from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, world_columns
 from geounfold.io.surfaces import read_surface_with_meta
-from geounfold.io.tables import ending, existing_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from geounfold.blockmodel import ModelFrame
-    from geounfold.mesh import Floats
+    from geounfold.body.model_frame import ModelFrame
+    from geounfold.geometry.mesh import Floats
 
 
 def carry(args: Namespace, console: Console) -> None:
@@ -68,9 +68,9 @@ def carry(args: Namespace, console: Console) -> None:
         else open_table(args, console, args.output, prefer, frame=frame, keep=False)
     )
     holes = read_holes(args, console)
-    from geounfold import mapping
+    from geounfold.mapping import mesh_map
 
-    saved = mapping.load(args.map)
+    saved = mesh_map.load(args.map)
     console.stage("carrying points")
     names = FOLDED if args.inverse else UNFOLDED
     places: Counter[str] = Counter()
@@ -115,10 +115,10 @@ def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Consol
         raise OptionError(
             f"--engine dask writes a folder that ends in .csv or .parquet, not '{args.output}'"
         )
-    from geounfold import mapping
-    from geounfold.clusters import Carrying, carry_folder
     from geounfold.io.outputs import whole_folder
-    from geounfold.io.parts import parts_of
+    from geounfold.io.tables.parts import parts_of
+    from geounfold.mapping import mesh_map
+    from geounfold.unfolding.dask_map import Carrying, carry_folder
 
     existing_file(Path(args.map))
     if Path(args.output).resolve() == Path(args.points).resolve():
@@ -126,7 +126,7 @@ def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Consol
     place = None if frame is None else frame.to_world
     how = Carrying(triple(args.columns), args.inverse, args.drop_invalid, kind, place)
     with whole_folder(args.output, overwrite=args.overwrite, watcher=console.journal) as folder:
-        saved = mapping.load(args.map)
+        saved = mesh_map.load(args.map)
         console.stage(f"looking through {args.points}")
         parts = parts_of(args.points)
         console.stage("carrying points")
@@ -153,9 +153,9 @@ def _carry_surface(
     """Carry a wireframe's vertices and write the same triangles between them."""
     console.stage(f"reading {args.points}")
     mesh, meta = read_surface_with_meta(args.points)
-    from geounfold import mapping
+    from geounfold.mapping import mesh_map
 
-    saved = mapping.load(args.map)
+    saved = mesh_map.load(args.map)
     console.stage("carrying vertices")
     vertices = mesh.V if frame is None else frame.to_world(mesh.V)
     carried = saved.carry(vertices, inverse=args.inverse)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from geounfold.cli.choices import whole_number
-from geounfold.cli.console import Console
-from geounfold.cli.endings import JSON
-from geounfold.cli.reading import TRUE, files_given, triple
+from geounfold.cli.file_endings import JSON
+from geounfold.cli.inputs.points import TRUE, files_given, triple
+from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError
 from geounfold.io import Outputs, read_points, write_json
-from geounfold.io.results import UNFOLDED
+from geounfold.io.result_columns import UNFOLDED
 
 
 def quality(args: Namespace, console: Console) -> None:
@@ -33,7 +33,7 @@ def quality(args: Namespace, console: Console) -> None:
                 f"{other.source}: has {len(other)} rows, but {folded.source} has {len(folded)}; "
                 "rows must belong together one by one"
             )
-    from geounfold.cli.figures import quality_figures
+    from geounfold.cli.answers.figures import quality_figures
 
     console.stage("measuring")
     figures = quality_figures(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from geounfold.cli.choices import whole_number
-from geounfold.cli.console import Console
-from geounfold.cli.endings import POINTS_OUT
+from geounfold.cli.file_endings import POINTS_OUT
+from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import OptionError
 from geounfold.io import Outputs
-from geounfold.io.tables import write_table
+from geounfold.io.tables.files import write_table
 
 
 def simulate(args: Namespace, console: Console) -> None:

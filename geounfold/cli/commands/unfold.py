@@ -5,25 +5,25 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING, Any, cast
 
-from geounfold.cli.choices import command_line, config_file, unfold_options
-from geounfold.cli.console import Console
-from geounfold.cli.endings import HTML, JSON, MAP, POINTS_OUT, VTU
-from geounfold.cli.exploring import check_grade_options, exploration, graded_samples
-from geounfold.cli.frames import model_frame
-from geounfold.cli.holes import TRACE_ENDINGS, check_hole_options, read_holes
-from geounfold.cli.places import flat_columns, place_counts, warn_of_outside
-from geounfold.cli.reading import files_given, open_table, read_samples
-from geounfold.cli.sides import BlockVolumes
+from geounfold.cli.answers.locations import flat_columns, place_counts, warn_of_outside
+from geounfold.cli.file_endings import HTML, JSON, MAP, POINTS_OUT, VTU
+from geounfold.cli.inputs.block_sizes import BlockVolumes
+from geounfold.cli.inputs.drillholes import TRACE_ENDINGS, check_hole_options, read_holes
+from geounfold.cli.inputs.grades import check_grade_options, exploration, graded_samples
+from geounfold.cli.inputs.model_frame import model_frame
+from geounfold.cli.inputs.points import files_given, open_table, read_samples
+from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import OptionError
 from geounfold.io import Outputs, PointTable, read_surface, write_json
-from geounfold.io.results import UNFOLDED, result_columns, world_columns
+from geounfold.io.result_columns import UNFOLDED, result_columns, world_columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from geounfold.mapping import UnfoldingMap
-    from geounfold.options import UnfoldOptions
-    from geounfold.pipeline import Unfolding
+    from geounfold.mapping.mesh_map import UnfoldingMap
+    from geounfold.unfolding.options import UnfoldOptions
+    from geounfold.unfolding.result import Unfolding
 
 
 def unfold(args: Namespace, console: Console) -> None:
@@ -64,13 +64,13 @@ def unfold(args: Namespace, console: Console) -> None:
         side: None if path is None else read_surface(path)
         for side, path in (("top", args.top), ("bottom", args.bottom))
     }
-    from geounfold import pipeline
+    from geounfold.unfolding import run
 
-    result = pipeline.unfold(table.points, options, progress=console.stage, **surfaces)
+    result = run.unfold(table.points, options, progress=console.stage, **surfaces)
     read = table.facts() if frame is None else {**table.facts(), **frame.facts()}
     summary = {**result.summary(), "input": read, "command": command_line(args)}
     if args.crosscheck:
-        from geounfold.verification import crosscheck as check_meshes
+        from geounfold.comparison.crosscheck import crosscheck as check_meshes
 
         summary = check_meshes(result, progress=console.stage).added_to(summary)
     warnings = summary.get("warnings", [])
@@ -106,14 +106,14 @@ def unfold(args: Namespace, console: Console) -> None:
         if "--map" in parts:
             result.save(parts["--map"])
         if "--mesh" in parts:
-            from geounfold.io.volumes import write_control
+            from geounfold.io.control_mesh import write_control
 
             mapped = cast("UnfoldingMap", result.map)  # the method has a control mesh: checked
             write_control(parts["--mesh"], mapped, result.certificate)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
         if "--report" in parts and isinstance(table, PointTable):  # which it is, read whole
-            from geounfold.cli.reporting import report_columns, report_holes
+            from geounfold.cli.answers.report_data import report_columns, report_holes
             from geounfold.report import write_report
 
             columns = _results(result, slice(0, len(table)))  # volumes are not drawn
@@ -159,7 +159,7 @@ def _results(
 
 def _check_pictures(console: Console) -> None:
     """Raise where nothing can be drawn, before anything is computed."""
-    from geounfold import plotting
+    from geounfold.report.plots.rendering import check_rendering
 
     console.stage("checking off-screen rendering")
-    plotting.check_rendering()
+    check_rendering()

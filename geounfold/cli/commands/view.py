@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.cli.console import Console
-from geounfold.cli.endings import MAP, PICTURE
-from geounfold.cli.reading import TRUE, read
+from geounfold.cli.file_endings import MAP, PICTURE
+from geounfold.cli.inputs.points import TRUE, read
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable
-from geounfold.io.results import UNFOLDED
-from geounfold.io.tables import ending, existing_file
+from geounfold.io.paths import ending, existing_file
+from geounfold.io.result_columns import UNFOLDED
 
 if TYPE_CHECKING:
-    from geounfold.mesh import Bools
+    from geounfold.geometry.mesh import Bools
 
 
 def view(args: Namespace, console: Console) -> None:
@@ -44,13 +44,15 @@ def view(args: Namespace, console: Console) -> None:
 
 def _draw_map(path: str, console: Console) -> bytes:
     """Return a picture of a saved map's control mesh in both spaces."""
-    from geounfold import mapping, plotting
-    from geounfold.control import scaled
+    from geounfold.mapping import mesh_map
+    from geounfold.mapping.control_mesh import scaled
+    from geounfold.report.plots import bodies
+    from geounfold.report.plots.figures import png
 
-    saved = mapping.load(path)
+    saved = mesh_map.load(path)
     folded = saved.frame.to_world(saved.control.folded.V)
     console.stage("drawing")
-    return plotting.png(plotting.draw_control(scaled(saved.control, folded, saved.frame.scale)))
+    return png(bodies.draw_control(scaled(saved.control, folded, saved.frame.scale)))
 
 
 def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
@@ -66,7 +68,8 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
             f"{table.source}: column '{label}' has {len(missing)} missing or infinite values, "
             f"the first in data row {missing[0] + 1}; choose a column that every row has"
         )
-    from geounfold import plotting
+    from geounfold.report.plots import bodies
+    from geounfold.report.plots.figures import png
 
     console.stage("drawing")
     look = _boxes_of(table, there)
@@ -75,15 +78,13 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
             twin = np.column_stack([table.numbers(name) for name in names])[there]
             titles = ("unfolded" if table.columns == UNFOLDED else "folded", title)
             look |= {"titles": titles}
-            return plotting.png(
-                plotting.draw_bodies(table.points[there], twin, values[there], label, **look)
-            )
-    return plotting.png(plotting.draw_body(table.points[there], values[there], label, **look))
+            return png(bodies.draw_bodies(table.points[there], twin, values[there], label, **look))
+    return png(bodies.draw_body(table.points[there], values[there], label, **look))
 
 
 def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:
     """Return blocks' sides for what draws them; nothing where all are alike, or unknown."""
-    from geounfold.blockmodel.sizes import Sides, size_columns
+    from geounfold.io.block_sizes import Sides, size_columns
     from geounfold.report.blocks import block_shape, level_sides
 
     with suppress(InputError):  # several sets of columns: none is taken unasked

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import InputError, OutputError
-from geounfold.io._text import listing
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.formats.registry import Meta, Surface, require
 from geounfold.io.formats.units import unit_name
-from geounfold.mesh import Floats, Ints
+from geounfold.io.messages import listing
 
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 21: "us-ft"}
 

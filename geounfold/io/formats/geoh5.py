@@ -23,12 +23,12 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import InputError, MissingDependencyError, OutputError
-from geounfold.io._text import listing
-from geounfold.io.formats.frames import flattened
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.formats.grids import with_sides
+from geounfold.io.formats.point_tables import flattened
 from geounfold.io.formats.registry import Meta, Points, Surface, require
 from geounfold.io.formats.units import unit_name
-from geounfold.mesh import Floats, Ints
+from geounfold.io.messages import listing
 
 _WORDS = {"m": "meter", "ft": "feet"}
 _LARGEST = 2**31 - 1

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from geounfold.errors import InputError, OutputError
-from geounfold.io._text import shown
-from geounfold.io.formats.frames import coded, missing_code
+from geounfold.io.formats.point_tables import coded, missing_code
 from geounfold.io.formats.registry import Meta, Points, Surface
 from geounfold.io.formats.units import unit_name
+from geounfold.io.messages import shown
 
 _NO_NAME = {"default", "local", "gocad local", "unknown", ""}
 

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.io.coordinates import side_families
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.coordinate_columns import side_families
 
 _SIDES = ("dx", "dy", "dz")
 _INDICES = ("i", "j", "k")

@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError
-from geounfold.io._text import shown
-from geounfold.io.formats.frames import coded, missing_code, typed_values
+from geounfold.io.column_values import unique_names
+from geounfold.io.formats.point_tables import coded, missing_code, typed_values
 from geounfold.io.formats.registry import Meta
-from geounfold.io.tables import unique_names
+from geounfold.io.messages import shown
 
 _MISSING = re.compile(r"missing values are (\S+)")
 _MOST_COLUMNS = 10_000

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from geounfold.errors import InputError
-from geounfold.io._text import shown
+from geounfold.io.messages import shown
 
 _PLY_END = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 _PLY_ELEMENT = re.compile(rb"^element[ \t]+(\w+)[ \t]+(\d{1,18})[ \t]*\r?$", re.MULTILINE)

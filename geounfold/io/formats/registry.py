@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from geounfold.errors import MissingDependencyError
-from geounfold.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints
 
 Meta = Mapping[str, str]
 """What is known of a file's coordinates: ``unit`` and ``crs``, where the format has them."""

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import InputError
-from geounfold.io.formats.frames import flattened
+from geounfold.geometry.mesh import Floats
 from geounfold.io.formats.grids import places, with_sides
+from geounfold.io.formats.point_tables import flattened
 from geounfold.io.formats.registry import Meta, Points, Surface
-from geounfold.mesh import Floats
 
 _META = ("unit", "crs")
 

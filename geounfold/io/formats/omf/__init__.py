@@ -24,11 +24,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from geounfold.errors import InputError
-from geounfold.io._text import listing
 from geounfold.io.formats.omf import prerelease, version1, version2
 from geounfold.io.formats.omf.elements import Element, Kind
 from geounfold.io.formats.omf.writing import write_points, write_surface
 from geounfold.io.formats.registry import Points, Surface
+from geounfold.io.messages import listing
 
 __all__ = ["read_points", "read_surface", "write_points", "write_surface"]
 

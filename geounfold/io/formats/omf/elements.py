@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from geounfold.errors import InputError
-from geounfold.io.formats.frames import flattened
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.column_values import unique_names
 from geounfold.io.formats.grids import Blocks, with_sides
+from geounfold.io.formats.point_tables import flattened
 from geounfold.io.formats.registry import Meta, Points
 from geounfold.io.formats.units import unit_name
-from geounfold.io.tables import unique_names
-from geounfold.mesh import Floats, Ints
 
 
 class Kind(Enum):

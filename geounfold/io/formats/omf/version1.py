@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from geounfold.geometry.mesh import Floats
 from geounfold.io.formats.grids import places, tensor_grid
 from geounfold.io.formats.omf.elements import (
     Element,
@@ -30,7 +31,6 @@ from geounfold.io.formats.omf.elements import (
     words_of,
 )
 from geounfold.io.formats.registry import Meta, Points, Surface
-from geounfold.mesh import Floats
 
 MAGIC = b"\x84\x83\x82\x81"
 _HEADER = struct.Struct("<4s32s16sQ")

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from geounfold.geometry.mesh import Floats
 from geounfold.io.formats.grids import Blocks, Grid, places, regular_grid, tensor_grid
 from geounfold.io.formats.omf.elements import (
     Element,
@@ -33,7 +34,6 @@ from geounfold.io.formats.omf.elements import (
     words_of,
 )
 from geounfold.io.formats.registry import Meta, Points, Surface
-from geounfold.mesh import Floats
 
 COMMENT = b"Open Mining Format "
 _INDEX = "index.json.gz"

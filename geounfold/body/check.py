@@ -1,0 +1,158 @@
+"""Checks that points can be a body: enough of them, in three directions."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.body.block_cells import MIXED, SAMPLE, Cells, neighbours
+from geounfold.body.lattice import (
+    Lattice,
+    distinct,
+    lattice_indices,
+    measure_lattice,
+    point_spacing,
+)
+from geounfold.errors import InputError
+from geounfold.geometry.mesh import Floats
+
+MIN_POINTS = 50
+"""Fewest distinct points of a body: a sheet of 5 x 5 blocks, two thick."""
+
+
+_FLAT = 0.05  # extent, in point spacings, below which points lie on a line or plane
+
+
+_SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
+
+
+_AROUND = 101  # nearest points among which three directions are looked for, itself included
+
+
+def count_duplicates(points: Floats) -> int:
+    """Return how many rows repeat the coordinates of another row.
+
+    >>> count_duplicates(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0]]))
+    2
+    """
+    key = points[:, 0] * MIXED[0] + points[:, 1] * MIXED[1] + points[:, 2] * MIXED[2]
+    ordered = np.sort(key)
+    same = ordered[1:][ordered[1:] == ordered[:-1]]
+    if not len(same):  # equal rows have equal keys
+        return 0
+    some = points[np.isin(key, same)]
+    return len(some) - len(distinct(some))
+
+
+def check_points(points: Floats, lattice: Lattice | None = None) -> None:
+    """Raise unless the points fill a body that can have a top and a bottom.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Finite world coordinates; duplicates are allowed.
+    lattice : Lattice, optional
+        Theirs, where the caller has measured it; measured here when left out.
+
+    Raises
+    ------
+    InputError
+        Too few distinct points; all in one column, on a line or in a plane; or all on one
+        surface and not on a lattice.  A folded sheet of one layer of blocks has a top and a
+        bottom, as its blocks have.
+    """
+    count = len(points) - count_duplicates(points)
+    _check_count(count, len(points))
+    if lattice is None:
+        _check_extent(points, count, point_spacing(points))
+        lattice = measure_lattice(distinct(points))
+    else:
+        _check_extent(points, count, float(np.cbrt(lattice.steps.prod())))
+    if lattice is not None and not Cells.of(lattice_indices(points, lattice)).gappy():
+        return
+    X = distinct(points)
+    if _one_layer_of_points(X) and not _in_three_directions(X):
+        raise InputError(
+            f"the {len(X)} points lie on one surface, on no lattice of touching blocks: a sheet "
+            "one block thick, and nothing tells how thick a block is; give at least two layers "
+            "of blocks (smaller blocks across the sheet)"
+        )
+
+
+def _check_count(count: int, rows: int) -> None:
+    if count < MIN_POINTS:
+        same = f" ({rows} rows with duplicates)" if rows > count else ""
+        raise InputError(
+            f"only {count} distinct points{same}, but a body needs at least {MIN_POINTS}; "
+            "give the centroids of all its blocks"
+        )
+
+
+def _check_extent(X: Floats, count: int, spacing: float) -> None:
+    """Raise when the points' extents across their main directions are (nearly) nothing.
+
+    So many of them are distinct, and they lie about so far apart.
+    """
+    limit = _FLAT * spacing
+    constant = np.ptp(X, axis=0) < limit
+    if constant.sum() == 2:
+        fixed = " and ".join(f"{'xyz'[i]} = {X[0, i]:.10g}" for i in np.flatnonzero(constant))
+        raise InputError(
+            f"all {count} points are in one column ({fixed}); "
+            "give a body that extends in all three directions"
+        )
+    centred = X - X.mean(axis=0)
+    along = centred @ np.linalg.eigh(centred.T @ centred)[1]
+    across, second = np.ptp(along[:, 0]), np.ptp(along[:, 1])
+    if second < limit:
+        raise InputError(
+            f"all {count} points are on one line; give a body that extends in all three directions"
+        )
+    if across < limit:
+        raise InputError(
+            f"all {count} points are in one plane, so nothing tells how thick the body is (and "
+            "it is unfolded already); give at least two layers of blocks"
+        )
+
+
+def _one_layer_of_points(X: Floats) -> bool:
+    """Say whether scattered points lie on one surface, within their noise.
+
+    A paraboloid is fitted to each point's 24 nearest neighbours across their direction of
+    least variance; the rms distance from it, over the median distance of the nearest
+    neighbour, is 0 on a surface and 0.5 for two layers.  Neighbourhoods along a line (columns
+    of flat blocks) count as thick.
+    """
+    some = X[:: -(-len(X) // SAMPLE)]
+    distance, near = neighbours(cKDTree(X), some, 25)
+    local = X[near] - X[near].mean(axis=1, keepdims=True)
+    spread, turn = np.linalg.eigh(np.einsum("nki,nkj->nij", local, local))
+    w, v, u = np.moveaxis(local @ turn, 2, 0)
+    scale = np.sqrt(spread[:, 2:] / 25)
+    u, v = u / scale, v / scale
+    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=2)
+    q = np.linalg.qr(basis)[0]
+    rest = w - (q @ (q.transpose(0, 2, 1) @ w[:, :, None]))[:, :, 0]
+    rms = np.sqrt(np.einsum("nk,nk->n", rest, rest) / (25 - 6))
+    rms[spread[:, 1] < 0.05 * spread[:, 2]] = np.inf
+    return bool(np.median(rms) < _SCATTER * np.median(distance[:, 1]))
+
+
+def _in_three_directions(X: Floats) -> bool:
+    """Say whether most points have neighbours along three directions, as blocks in layers have.
+
+    From the nearest other point; the nearest across it; and the nearest more than 60 degrees out
+    of the plane of both, which a sheet of one layer has none of.  Folded grids of flat or
+    long blocks, whose nearest points all lie on a line or two, count as thick by this.
+    """
+    some = X[:: -(-len(X) // SAMPLE)]
+    near = neighbours(cKDTree(X), some, _AROUND)[1]
+    D = X[near[:, 1:]] - some[:, None]
+    length = np.linalg.norm(D, axis=2)
+    first = D[:, 0] / length[:, :1]
+    across = np.abs(np.einsum("nki,ni->nk", D, first)) < 0.3 * length
+    second = D[np.arange(len(D)), across.argmax(axis=1)]
+    normal = np.cross(first, second)
+    size = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)
+    out = np.abs(np.einsum("nki,ni->nk", D, normal)) > 0.87 * length * size[:, None]
+    return bool((across.any(axis=1) & out.any(axis=1)).mean() > 0.5)

@@ -1,0 +1,179 @@
+"""Blocks merged into cells, where there are more of them than the sheet's shape needs.
+
+Hull, split and sheet follow folds, outline and thickness; on blocks much smaller than those they
+would cost more and say the same.  So the blocks of every ``merge x merge x merge`` places become
+one cell with the share of it that they fill.  The blocks near the body's surface are marked: they
+alone know where it is to a fraction of a block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from geounfold.errors import OptionError
+from geounfold.geometry.mesh import Bools, Floats, Ints
+
+_SLANT = 1.5
+"""Mean over all directions of |nx| + |ny| + |nz|: faces of blocks per unit of a smooth surface."""
+
+_DENSE = 8  # places of the cells' box per block up to which they are counted in an array
+_FILLED = 0.5  # least share of an inner cell off a lattice, where blocks per cell vary
+_OFF = np.array([0.3711, 0.6173, 0.1437])  # of a cell: no point of a grid on the cells' borders
+_AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoarseOptions:
+    """When and how far blocks are merged.
+
+    ``blocks``: number of blocks up to which none are; ``surface``: least area of the body's
+    surface, and ``layers``: least thickness of the sheet, that merging leaves, in cells.
+    """
+
+    blocks: int = 60_000
+    surface: float = 12_000.0
+    layers: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.blocks >= 1 and self.surface > 0 and self.layers > 0):
+            raise OptionError(
+                "coarse options must be positive, but are "
+                f"blocks {self.blocks}, surface {self.surface}, layers {self.layers}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """A body's blocks merged into cells.
+
+    Attributes
+    ----------
+    merge : int
+        Blocks along a cell's side.
+    points : (k, 3) float
+        Mean place of the blocks in each cell, in working units divided by ``merge``.
+    share : (k,) float
+        Share of each cell that they fill; 1 is full.
+    border : (n,) bool
+        For every block: whether its cell or one of the 26 around it is not full.
+    beside : (n,) bool
+        The same, and whether one of those 26 holds border blocks.
+    """
+
+    merge: int
+    points: Floats
+    share: Floats
+    border: Bools
+    beside: Bools
+
+
+def merges(points: Floats, steps: Floats | None, options: CoarseOptions) -> tuple[int, ...]:
+    """Return how many blocks to merge along a cell's side: as many as options allow, then fewer.
+
+    Empty where none are to be merged.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Blocks, working units.
+    steps : (3,) float or None
+        Block sides, where the blocks lie on a lattice at whole multiples of them.
+    options : CoarseOptions
+        See there.
+    """
+    if len(points) <= options.blocks:
+        return ()
+    found, merge = [], _most(points, steps, options)
+    while merge > 1:
+        found.append(merge)
+        merge = 3 * merge // 4
+    return tuple(found)
+
+
+def merged(points: Floats, steps: Floats | None, merge: int) -> Coarse:
+    """Return the blocks merged into cells of ``merge`` blocks a side (see merges)."""
+    cells = _Cells.of(_places(points, steps, merge))
+    share = cells.count / merge**3
+    middle = [np.bincount(cells.row, x) / cells.count / merge for x in points.T]
+    full = share >= (_FILLED if steps is None else 1.0)
+    inner = cells.least(full.astype(np.float64))
+    deep = cells.least(inner)
+    return Coarse(
+        merge,
+        np.stack(middle, axis=1),
+        share,
+        (inner < 1)[cells.row],
+        (deep < 1)[cells.row],
+    )
+
+
+def _most(points: Floats, steps: Floats | None, options: CoarseOptions) -> int:
+    """Return the most blocks to merge along a side, 1 for none.
+
+    Surface and thickness are measured on cells of two blocks a side.
+    """
+    cells = _Cells.of(_places(points, steps, 2))
+    sides = np.ones(3) if steps is None else steps
+    area = 4 * cells.area(cells.count / 8, 1 / sides) / _SLANT
+    thickness = 2 * len(points) / area
+    wanted = np.ceil(np.sqrt(area / options.surface))
+    return int(max(1, min(wanted, thickness // options.layers)))
+
+
+def _places(points: Floats, steps: Floats | None, merge: int) -> Ints:
+    """Return the cell of every block, (n, 3)."""
+    at = points / merge + _OFF if steps is None else (np.rint(points / steps) + 0.5) / merge
+    return np.floor(at).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Cells by sorted keys, the number of blocks in each, and every block's cell."""
+
+    key: Ints
+    count: Ints
+    row: Ints
+    stride: Ints
+
+    @classmethod
+    def of(cls, places: Ints) -> _Cells:
+        low = places.min(axis=0) - 2
+        shape = places.max(axis=0) - low + 3
+        stride = np.array([shape[1] * shape[2], shape[2], 1])
+        key = (places - low) @ stride
+        if shape.prod() > _DENSE * len(key):
+            distinct, row, count = np.unique(key, return_inverse=True, return_counts=True)
+            return cls(distinct, count, row, stride)
+        every = np.bincount(key)
+        distinct = np.flatnonzero(every)
+        number = np.zeros(len(every), dtype=np.int64)
+        number[distinct] = np.arange(len(distinct))
+        return cls(distinct, every[distinct], number[key], stride)
+
+    def at(self, values: Floats, step: tuple[int, ...]) -> Floats:
+        """Return the values (k,) of the cells a step away, 0 where there is none."""
+        wanted = self.key + np.array(step) @ self.stride
+        found = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
+        return np.where(self.key[found] == wanted, values[found], 0.0)
+
+    def least(self, values: Floats) -> Floats:
+        """Return the least value of each cell and the 26 around it, (k,)."""
+        out = values
+        for step in product((-1, 0, 1), repeat=3):
+            out = np.minimum(out, self.at(values, step))
+        return out
+
+    def area(self, share: Floats, faces: Floats) -> float:
+        """Return the area of the surface of partly filled cells, steps of its stairs included.
+
+        The total variation of their shares (k,), ``faces`` (3,) the area of a cell's face across
+        each axis: by the co-area formula, the mean area over all levels of the share.
+        """
+        total = 0.0
+        for step, face in zip(_AXES, faces.tolist(), strict=True):
+            last = self.at(np.ones(len(share)), tuple(-s for s in step)) == 0
+            total += face * float(np.abs(share - self.at(share, step)).sum() + share[last].sum())
+        return total

@@ -1,0 +1,120 @@
+"""A body made ready for the methods: its lattice, its working frame, its parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geounfold.body.check import check_points
+from geounfold.body.lattice import Lattice, distinct, measure_lattice
+from geounfold.body.noisy_lattice import disturbed_lattice
+from geounfold.body.scattered import QUIET, unevenness
+from geounfold.body.separate import select_body, separate_bodies
+from geounfold.body.sub_blocks import solid_cells
+from geounfold.body.working_frame import Frame, working_frame
+from geounfold.geometry.mesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedPoints:
+    """The points of a run, and what was measured of them.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        As given, in the data's coordinates.
+    work : (n, 3) float
+        The same in working units: one block has volume 1.
+    frame : Frame
+        Between the data's coordinates and working units.
+    lattice : Lattice or None
+        The lattice of the blocks; None for scattered points and noisy grids.
+    groups : tuple of (k,) int
+        Rows of each body to unfold.
+    """
+
+    points: Floats
+    work: Floats
+    frame: Frame
+    lattice: Lattice | None
+    groups: tuple[Ints, ...]
+
+    @property
+    def chosen(self) -> int:
+        """Number of points in the bodies to unfold."""
+        return sum(len(group) for group in self.groups)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPoints:
+    """The points of one body, working units, in lexicographic order.
+
+    Attributes
+    ----------
+    fitted : (m, 3) float
+        What the body is fitted to: blocks on their lattice, sub-blocks and gaps filled.
+    blocks : (b, 3) float
+        The blocks as given, which the map has to hold.
+    """
+
+    fitted: Floats
+    blocks: Floats
+
+
+def prepare(
+    points: Floats, body: int | str | None = None
+) -> tuple[PreparedPoints, list[BodyPoints]]:
+    """Return the points made ready, and each body's own.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Finite centroids in the data's coordinates, any order and orientation.
+    body : int, "all" or None
+        Which of several separate bodies (see `select_body`).
+
+    Raises
+    ------
+    InputError
+        The points are no body, or several and none is chosen.
+    OptionError
+        There is no body of that number.
+    """
+    lattice = measure_lattice(points)
+    solid = solid_cells(points, lattice)
+    filled, lattice = (points, lattice) if solid is None else (solid.points, solid.lattice)
+    frame = _frame(points, filled, lattice)
+    work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))
+    labels = separate_bodies(work, frame)
+    own = labels if solid is None else labels[solid.home]
+    groups = select_body(points, own, body)
+    given = frame.to_work(points)
+    bodies = [
+        BodyPoints(_sorted(work[labels == own[group[0]]]), _sorted(given[group]))
+        for group in groups
+    ]
+    return PreparedPoints(points, given, frame, lattice, groups), bodies
+
+
+def _frame(points: Floats, filled: Floats, lattice: Lattice | None) -> Frame:
+    """Return the working frame, after checking that the points can be a body.
+
+    Points on no lattice that are even enough to be a grid with noise get the frame of that grid.
+    """
+    if lattice is None:
+        unique = distinct(points)
+        noisy = disturbed_lattice(unique) if unevenness(unique) > QUIET else None
+        if noisy is not None:
+            check_points(points @ noisy.axes.T / noisy.steps)
+            return working_frame(points, noisy, exact=False)
+    check_points(filled, lattice)
+    return working_frame(filled, lattice)
+
+
+def _sorted(points: Floats) -> Floats:
+    """Return points in lexicographic order.
+
+    Floating-point sums over them then do not depend on the order of the input rows.
+    """
+    return points[np.lexsort(points.T[::-1])]

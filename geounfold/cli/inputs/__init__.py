@@ -1,0 +1,1 @@
+"""What commands read: points, block sizes, drill-holes, options."""

@@ -1,0 +1,134 @@
+"""Estimation on the command line: words to options, and what the summary tells."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.errors import InputError, OptionError
+from geounfold.io.paths import existing_file
+
+if TYPE_CHECKING:
+    from geounfold.estimation import Estimation, Variogram
+    from geounfold.io import PointTable
+
+_WHOLE = ("min_samples", "max_samples", "max_per_hole")
+
+
+def estimation(
+    args: Namespace, samples: PointTable, blocks: PointTable, stage: Callable[[str], None]
+) -> Estimation:
+    """Return the estimates that a command asks for.
+
+    Raises
+    ------
+    OptionError
+        Words that are no valid options.
+    InputError
+        Files without what is needed.
+    """
+    near = _neighbourhood(args)
+    mean = None if args.mean is None else _number(args.mean, "--mean")
+    power = _number(args.power, "--power")
+    workers = whole_number(args.workers, "--workers")
+    variogram = None if args.variogram is None else _variogram(args.variogram)
+    from geounfold.estimation import estimate
+    from geounfold.mapping import mesh_map
+
+    saved = mesh_map.load(args.map)
+    stage("estimating")
+    return estimate(
+        saved, _table(samples, args), blocks.points, variogram,
+        grade=args.grade, method=args.method, neighbourhood=near,
+        mean=mean, power=power, workers=workers,
+    )  # fmt: skip
+
+
+def summarised(args: Namespace, result: Estimation, stage: Callable[[str], None]) -> dict[str, Any]:
+    """Return the summary, with the cross-validation where it is asked for."""
+    out = result.summary()
+    if args.cross_validate:
+        from geounfold.estimation import score
+
+        stage("cross-validating")
+        found = result.cross_validation()
+        out["cross_validation"] = {
+            **asdict(score(result.samples.grades, found.estimate)),
+            "flags": found.counts(),
+        }
+    return out
+
+
+def _table(samples: PointTable, args: Namespace) -> pd.DataFrame:
+    """Return the samples' coordinates, grade and holes as one table."""
+    if args.grade in (*samples.columns, *"xyz", "hole"):
+        raise OptionError(f"--grade {args.grade} names a coordinate or the holes")
+    grade = samples.numbers(args.grade)
+    columns: dict[str, Any] = dict(zip("xyz", samples.points.T, strict=True))
+    hole = args.hole or _hole(samples)
+    if hole is not None:
+        if list(samples.frame.columns).count(hole) != 1:
+            raise InputError(f"{samples.source}: no column '{hole}', or more than one")
+        columns["hole"] = samples.frame[hole].to_numpy()
+    return pd.DataFrame({**columns, args.grade: grade})
+
+
+def _hole(samples: PointTable) -> str | None:
+    """Return the column that names the holes, where there is one."""
+    from geounfold.drillholes import ALIASES
+    from geounfold.io.coordinate_columns import plain_name
+
+    aliases = ALIASES["assay"]["hole"]
+    found = [str(name) for name in samples.frame.columns if plain_name(name) in aliases]
+    return found[0] if len(found) == 1 else None
+
+
+def _neighbourhood(args: Namespace) -> dict[str, Any]:
+    """Return what was said of the search."""
+    near: dict[str, Any] = {
+        name: whole_number(getattr(args, name), f"--{name.replace('_', '-')}")
+        for name in _WHOLE
+        if getattr(args, name) is not None
+    }
+    if args.radii is not None:
+        near["radii"] = _three(args.radii, "--radii")
+    if args.rotation is not None:
+        if args.radii is None:
+            raise OptionError("--rotation needs --radii: without, the search is the variogram's")
+        near["rotation"] = _three(args.rotation, "--rotation")
+    return near
+
+
+def _variogram(path: str) -> Variogram:
+    from geounfold.estimation import from_json
+
+    try:
+        text = existing_file(Path(path)).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text") from error
+    return from_json(text, path)
+
+
+def _three(text: str, option: str) -> tuple[float, float, float]:
+    words = text.split(",")
+    if len(words) != 3:
+        raise OptionError(f"{option} needs three numbers such as 150,150,20, not '{text}'")
+    a, b, c = (_number(word, option) for word in words)
+    return a, b, c
+
+
+def _number(text: str, option: str) -> float:
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise OptionError(f"{option} needs a number, not '{text}'") from error
+    if not np.isfinite(value):
+        raise OptionError(f"{option} needs a finite number, not '{text}'")
+    return value

@@ -1,0 +1,141 @@
+"""What the command line says: progress, warnings and errors on stderr, answers on stdout."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, TextIO, cast
+
+from geounfold.cli.process.journal import Journal
+from geounfold.cli.terminal.progress import Careful, Progress, progress_on
+from geounfold.cli.terminal.time_left import Forecast
+from geounfold.errors import OutputError
+
+
+class Console:
+    """Messages on stderr; progress only where that is a terminal.
+
+    Parameters
+    ----------
+    quiet : bool, optional
+        Neither progress nor warnings.
+    json : bool, optional
+        Answers are JSON.
+    plain : bool, optional
+        Progress that does not mind other lines between (``-v``).
+    stream : text stream, optional
+        Instead of stderr.
+    journal : Journal, optional
+        Where outputs are noted; nobody reads it without.
+
+    Attributes
+    ----------
+    journal : Journal
+        As given.
+    """
+
+    def __init__(
+        self,
+        *,
+        quiet: bool = False,
+        json: bool = False,
+        plain: bool = False,
+        stream: TextIO | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self.journal = journal or Journal()
+        given = sys.stderr if stream is None else stream
+        self._stream = None if given is None else cast(TextIO, Careful(given))
+        self._quiet, self._json, self._plain = quiet, json, plain
+        self._live = not quiet and self._stream is not None and self._stream.isatty()
+        self._shown = False
+        self._forecast = Forecast()
+
+    @cached_property
+    def _progress(self) -> Progress:
+        return progress_on(cast(TextIO, self._stream), self._forecast, plain=self._plain)
+
+    def stage(self, name: str) -> None:
+        """Show the stage that begins, in place of the one before."""
+        if self._live:
+            self._progress.stage(_one_line(name))
+            self._shown = True
+
+    def done(self, text: str) -> None:
+        """Say what a run has done, on a terminal."""
+        if self._live:
+            self._clear()
+            self._write(f"{_one_line(text)} ({self._forecast.elapsed:.1f} s)\n")
+
+    def warn(self, text: str) -> None:
+        """Say what to distrust; in a pipe too, unless quiet."""
+        if not self._quiet:
+            self._clear()
+            self._write(f"geounfold: warning: {_one_line(text)}\n")
+
+    def error(self, text: str) -> None:
+        """Say in one line why nothing came of it."""
+        self._clear()
+        self._write(f"geounfold: error: {_one_line(text)}\n")
+
+    def answer(self, facts: dict[str, Any], text: Callable[[], str] | None = None) -> None:
+        """Give an answer on stdout: as one JSON object where that was asked for, else as text.
+
+        Parameters
+        ----------
+        facts : dict
+            What JSON tells.
+        text : callable, optional
+            Makes the text; without, only JSON says anything.
+
+        Raises
+        ------
+        OutputError
+            See `say`.
+        """
+        if self._json:
+            from geounfold.io.json_text import json_text
+
+            self.say(json_text(facts))
+        elif text is not None:
+            self.say(text())
+
+    def say(self, text: str) -> None:
+        """Print an answer on stdout.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written where stdout leads; a reader that has left is BrokenPipeError.
+        """
+        self._clear()
+        if sys.stdout is None:
+            return
+        try:
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise OutputError(f"cannot write to stdout: {error.strerror or error}") from error
+
+    def _clear(self) -> None:
+        """Take progress away: another line comes; also what a run that was killed left."""
+        if self._live:
+            if self._shown:
+                self._progress.clear()
+            else:
+                self._write("\r\x1b[K")
+            self._shown = False
+
+    def _write(self, text: str) -> None:
+        """Write a message; one that cannot be shown (stderr closed, full) is no reason to fail."""
+        if self._stream is not None:
+            self._stream.write(text)
+            self._stream.flush()
+
+
+def _one_line(text: str) -> str:
+    """Return text without line breaks and control characters."""
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))

@@ -1,0 +1,1 @@
+"""Meshes, measures, rotations and search structures; no geology."""

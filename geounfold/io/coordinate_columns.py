@@ -1,0 +1,275 @@
+"""Which columns hold the coordinates, and their values as numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError, OptionError
+from geounfold.geometry.mesh import Bools, Floats
+from geounfold.io.column_values import objects
+from geounfold.io.messages import counted, listing, shown
+
+Triple = tuple[str, str, str]
+
+
+# Spelled without case, spaces, underscores and units: "X_Centre (m)" is xcentre.
+_PATTERNS = (
+    "centroid{}",
+    "{}centroid",
+    "{}",
+    "{}c",
+    "{}centre",
+    "{}center",
+    "centre{}",
+    "center{}",
+    "mid{}",
+    "{}mid",
+    "{}coord",
+    "coord{}",
+    "{}world",
+    "world{}",
+)
+
+
+_WORLD = (("xworld", "yworld", "zworld"), ("worldx", "worldy", "worldz"))
+
+
+_NAMED = (("easting", "northing", "elevation"), ("east", "north", "elevation"))
+
+
+_FAMILIES: tuple[Triple, ...] = (
+    *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
+    *_NAMED,
+)
+
+
+_SIDE_PATTERNS = (
+    "{}inc", "{}increment", "d{}", "{}size", "size{}", "{}blocksize", "blocksize{}", "{}length",
+    "length{}", "{}len", "dim{}", "{}dim", "{}dimension", "{}width", "block{}", "{}block",
+)  # fmt: skip
+
+
+_SIDES: tuple[Triple, ...] = tuple(
+    (p.format("x"), p.format("y"), p.format("z")) for p in _SIDE_PATTERNS
+)
+
+
+# Looked for only where none of the above is complete: x, y, z beside elevation is no question.
+_MIXED: tuple[Triple, ...] = tuple(
+    (a, b, c)
+    for a, b in (("easting", "northing"), ("east", "north"), ("x", "y"), ("e", "n"))
+    for c in ("elevation", "elev", "rl", "z", "altitude", "level")
+    if (a, b, c) not in _FAMILIES
+)
+
+
+_NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
+
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+|[+-]?\d+,\d+")
+
+
+_MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
+
+
+def plain_name(name: object) -> str:
+    """Return a column name without case, unit in brackets, spaces and underscores."""
+    bare = re.sub(r"[(\[][^)\]]*[)\]]\s*$", "", str(name))
+    return re.sub(r"[\s_\-.]+", "", bare).casefold()
+
+
+def side_families(names: Sequence[str]) -> list[Triple]:
+    """Return the sets of columns that may be blocks' sides, by their `plain_name`.
+
+    Examples
+    --------
+    >>> side_families(["x", "y", "z", "XINC", "YINC", "ZINC"])
+    [('xinc', 'yinc', 'zinc')]
+    """
+    plain = {plain_name(name) for name in names}
+    return [family for family in _SIDES if set(family) <= plain]
+
+
+def parse_columns(text: str) -> Triple:
+    """Return the three names of a ``a,b,c`` option, in which quotes protect commas.
+
+    Raises
+    ------
+    OptionError
+        When these are not three different names.
+    """
+    names = [name.strip() for name in next(csv.reader([text], skipinitialspace=True), [])]
+    if len(names) != 3 or len(set(names)) != 3 or not all(names):
+        raise OptionError(
+            f"--columns needs three different column names such as XC,YC,ZC, not '{shown(text)}'"
+        )
+    return names[0], names[1], names[2]
+
+
+def coordinate_columns(
+    names: Sequence[str],
+    columns: Triple | None = None,
+    *,
+    source: str = "the table",
+    own: bool = False,
+) -> tuple[int, int, int]:
+    """Return the positions of the three coordinate columns.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The table's column names.
+    columns : three str, optional
+        Their names. Without them: centroid_x/y/z, x/y/z, XC/YC/ZC, xcentre/ycentre/zcentre,
+        easting/northing/elevation and the like, in any letter case; world_x/y/z before any other.
+    source : str, optional
+        Begins the messages: the file's name.
+    own : bool, optional
+        A block model's own coordinates are wanted: world_x/y/z are passed over.
+
+    Raises
+    ------
+    InputError
+        No complete set, more than one, or a name that is there twice.
+
+    Examples
+    --------
+    >>> coordinate_columns(["IJK", "XC", "YC", "ZC", "XINC"])
+    (1, 2, 3)
+    """
+    if columns is not None:
+        a, b, c = (_position(names, name, source) for name in columns)
+        if len({a, b, c}) != 3:
+            raise InputError(f"{source}: the columns {listing(columns)} are not three columns")
+        return a, b, c
+    plain = [plain_name(name) for name in names]
+    for tier in (_FAMILIES, _MIXED):
+        found = [family for family in tier if set(family) <= set(plain)]
+        in_world = [family for family in found if family in _WORLD]
+        if own:
+            found = [family for family in found if family not in _WORLD]
+        elif in_world:
+            found = in_world
+        if found:
+            return _only(found, names, plain, source)
+    if _all_numbers(names):
+        hint = "the first row must name the columns"
+    elif len(names) == 1:
+        hint = "columns are separated by commas, semicolons or tabs"
+    else:
+        hint = "name them by --columns a,b,c"
+    raise InputError(
+        f"{source}: no coordinate columns (such as x, y, z or centroid_x, centroid_y, "
+        f"centroid_z) found; the file has: {listing(names)}; {hint}"
+    )
+
+
+def _all_numbers(names: Sequence[str]) -> bool:
+    return all(re.fullmatch(_NUMBER, str(n).strip(), re.IGNORECASE) for n in names)
+
+
+def _position(names: Sequence[str], wanted: str, source: str) -> int:
+    """Return where a named column is: the exact name first, else in any letter case."""
+    for same in (str.__eq__, lambda a, b: a.strip().casefold() == b.strip().casefold()):
+        found = [i for i, name in enumerate(names) if same(str(name), wanted)]
+        if len(found) > 1:
+            raise InputError(
+                f"{source}: the column '{shown(wanted)}' is ambiguous: it is there "
+                f"{len(found)} times ({listing(names[i] for i in found)}); rename all but one"
+            )
+        if found:
+            return found[0]
+    raise InputError(f"{source}: no column '{shown(wanted)}' found; the file has: {listing(names)}")
+
+
+def _only(
+    found: list[Triple], names: Sequence[str], plain: list[str], source: str
+) -> tuple[int, int, int]:
+    """Return the one set found, or an error naming all candidates."""
+    if len(found) > 1:
+        sets = " and ".join(
+            "/".join(shown(names[plain.index(axis)]) for axis in family) for family in found
+        )
+        raise InputError(f"{source}: ambiguous coordinate columns {sets}; choose by --columns")
+    for axis in found[0]:
+        twice = [names[i] for i, name in enumerate(plain) if name == axis]
+        if len(twice) > 1:
+            raise InputError(
+                f"{source}: ambiguous coordinate columns, several are called alike: "
+                f"{listing(twice)}; choose by --columns, or rename all but one"
+            )
+    a, b, c = (plain.index(axis) for axis in found[0])
+    return a, b, c
+
+
+def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
+    """Return a column's values, (n,) float; missing ones are NaN.
+
+    Raises
+    ------
+    InputError
+        A value is not a number: the first one is named with its row.
+    """
+    name = shown(column.name)
+    if _has_other_type(column):
+        raise InputError(f"{source}: column '{name}' is not numeric: it holds {column.dtype}")
+    values, wrong = readable_numbers(column)
+    bad = np.flatnonzero(wrong)
+    if len(bad):
+        first = str(objects(column)[bad[0]]).strip()
+        others = f" ({counted(len(bad), 'such value')})" if len(bad) > 1 else ""
+        raise InputError(
+            f"{source}: column '{name}' is not numeric: data row {bad[0] + 1} has "
+            f"'{shown(first)}'{others}{_hint(first)}"
+        )
+    return values
+
+
+def readable_numbers(column: pd.Series) -> tuple[Floats, Bools]:
+    """Return a column's values, (n,) float, and which of them are there but no numbers, (n,) bool.
+
+    Both these and missing ones are NaN.
+    """
+    kind = column.dtype
+    if _has_other_type(column):
+        return np.full(len(column), np.nan), column.notna().to_numpy(dtype=bool)
+    if pd.api.types.is_numeric_dtype(kind):
+        values = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        return np.asarray(values, dtype=np.float64), np.zeros(len(column), dtype=bool)
+    text = objects(column)
+    try:
+        values = text.astype(np.float64)
+    except (TypeError, ValueError):
+        return _with_gaps(text)
+    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000, no other tool does
+        return _with_gaps(text)
+    return np.asarray(values, dtype=np.float64), np.zeros(len(column), dtype=bool)
+
+
+def _has_other_type(column: pd.Series) -> bool:
+    kind = column.dtype
+    return pd.api.types.is_bool_dtype(kind) or pd.api.types.is_datetime64_any_dtype(kind)
+
+
+def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
+    """Return numbers where some values are missing or no numbers, and which are the latter."""
+    words = pd.Series([str(value).strip() for value in text], dtype=object)
+    missing = words.str.casefold().isin(_MISSING).to_numpy()
+    good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
+    values = np.full(len(words), np.nan)
+    values[good & ~missing] = words.to_numpy(dtype=object)[good & ~missing].astype(np.float64)
+    return values, np.asarray(~missing & ~good)
+
+
+def _hint(word: str) -> str:
+    """Return what to do about a number in another country's notation."""
+    if "," in word and _DECIMAL_COMMA.fullmatch(word):
+        return "; write decimals with a point, not a comma"
+    if re.fullmatch(r"[+-]?\d{1,3}(?:[, '\u00a0\u2009\u202f]\d{3})+(?:\.\d+)?", word):
+        return "; write numbers without thousands separators"
+    return ""

@@ -1,0 +1,46 @@
+"""Paths of files: their endings, and whether they are there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from geounfold.errors import InputError
+from geounfold.io.messages import shown
+
+TABLE_ENDINGS = (".csv", ".csv.gz", ".parquet")
+
+
+def ending(path: Path) -> str:
+    """Return a file's ending in lower case; ``.csv.gz`` counts as one.
+
+    Examples
+    --------
+    >>> ending(Path("Blocks.v2.CSV.GZ"))
+    '.csv.gz'
+    """
+    name = path.name.lower()
+    return ".csv.gz" if name.endswith(".csv.gz") else Path(name).suffix
+
+
+def existing_file(path: Path) -> Path:
+    """Return the path of a file that can be read and is not empty.
+
+    Raises
+    ------
+    InputError
+        No such file, a directory, a pipe or device, not readable, or empty.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a directory, not a file")
+        if not path.exists():
+            raise InputError(f"{path}: no such file")
+        if not path.is_file():
+            raise InputError(f"{path}: is a pipe or a device; save what it holds to a file first")
+        with path.open("rb") as stream:
+            if not stream.read(1):
+                raise InputError(f"{path}: the file is empty")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{shown(path)}: cannot be read: {reason}") from error
+    return path

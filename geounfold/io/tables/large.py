@@ -1,0 +1,345 @@
+"""Large tables of points, a batch of rows at a time.
+
+The coordinates are read first, and kept where the caller needs them all.  The other columns are
+read when the result is written, beside it and in the same batches, so that memory holds a batch of
+them at most.  What comes out is what `geounfold.io.points` would write.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any, Protocol, cast
+
+import numpy as np
+import pandas as pd
+
+from geounfold.body.check import count_duplicates
+from geounfold.errors import InputError
+from geounfold.geometry.measures import LARGEST_COORDINATE
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.column_values import TextKind
+from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
+from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.tables.csv_text import csv_header, csv_reader, most_unpacked
+from geounfold.io.tables.files import table_writer, with_columns
+from geounfold.io.tables.parquet import pyarrow_module
+from geounfold.io.tables.points import Place, PointTable, read_points
+
+BATCH = 1 << 17
+"""Rows in a batch."""
+
+LARGE = 1 << 24
+"""Bytes of a CSV from which it is read in batches; of a compressed one, a fourth."""
+
+_HEAD = 1 << 20  # bytes among which the header is looked for
+
+_FAULTS = (
+    InputError,
+    ValueError,
+    KeyError,
+    NotImplementedError,
+    OSError,
+    EOFError,
+    zlib.error,
+    csv.Error,
+)
+"""What readers raise on files that are no sound tables, Arrow's and pandas's errors included."""
+
+Make = Callable[[pd.DataFrame, Floats, slice], dict[str, Any]]
+"""Returns the result's columns for a batch: its table, its points (k, 3), which rows of all."""
+
+
+class Source(Protocol):
+    """A file of rows that can be read again and again."""
+
+    names: list[str]
+    text: bool
+
+    def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
+        """Yield the rows in batches; some columns alone where that is cheaper."""
+
+
+class ParquetSource:
+    """A Parquet file."""
+
+    text = False
+
+    def __init__(self, path: Path) -> None:
+        self._file = pyarrow_module().parquet.ParquetFile(path)
+        self.names = list(self._file.schema_arrow.names)
+        self.rows = int(self._file.metadata.num_rows)
+
+    @property
+    def group_rows(self) -> list[int]:
+        """How many rows each row group has."""
+        meta = self._file.metadata
+        return [int(meta.row_group(k).num_rows) for k in range(meta.num_row_groups)]
+
+    def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
+        """Yield batches in the columns' own types."""
+        chosen = None if columns is None else [self.names[k] for k in columns]
+        for batch in self._file.iter_batches(batch_size=BATCH, columns=chosen):
+            frame = batch.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
+            yield frame if chosen is None else frame[chosen]
+
+
+class CsvSource:
+    """A CSV file, whose columns are text."""
+
+    text = True
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._packed = ending(path) == ".csv.gz"
+        with self._open() as stream:
+            head = stream.read(_HEAD)
+            self.names, self.separator, self.skip = csv_header(path, head)
+        self._check()
+
+    def _open(self) -> IO[bytes]:
+        if self._packed:
+            return cast(IO[bytes], gzip.open(self._path, "rb"))
+        return self._path.open("rb")
+
+    def _check(self) -> None:
+        """Raise where the file holds binary data, or unpacks to no end."""
+        most, total = most_unpacked(self._path), 0
+        with self._open() as stream:
+            while chunk := stream.read(_HEAD):
+                total += len(chunk)
+                if b"\0" in chunk or (self._packed and total > most):
+                    raise InputError(f"{self._path}: is not a table")
+
+    def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
+        """Yield batches of text."""
+        with ExitStack() as stack:
+            stream = stack.enter_context(self._open())
+            reader = stack.enter_context(
+                csv_reader(stream, len(self.names), self.separator, self.skip, BATCH)
+            )
+            for frame in reader:
+                if not isinstance(frame.index, pd.RangeIndex):
+                    raise InputError(f"{self._path}: rows have more values than there are columns")
+                whole = frame.fillna("").reset_index(drop=True)
+                whole.columns = pd.Index(self.names, dtype=object)
+                yield whole if columns is None else whole.iloc[:, list(columns)]
+
+
+@dataclass(frozen=True, eq=False)
+class PointStream:
+    """Points of a large file; see `geounfold.io.points.PointTable` for what it is like.
+
+    Attributes
+    ----------
+    source : str
+        The file, as it was named.
+    rows : Source
+        What its rows are read from.
+    columns : three str
+        Names of the coordinate columns.
+    kept : (n, 3) float or None
+        The coordinates, where they were to be kept.
+    count : int
+        How many points there are.
+    dropped : (k,) int
+        The data rows left out for want of finite coordinates, counted from 1.
+    place : callable or None
+        Takes the file's coordinates to the world's.
+    meta : dict of str
+        Empty: these files tell neither unit nor coordinate reference.
+    """
+
+    source: str
+    rows: Source
+    columns: Triple
+    kept: Floats | None
+    count: int
+    dropped: Ints
+    place: Place | None = None
+    meta: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return self.count
+
+    @property
+    def points(self) -> Floats:
+        """The coordinates, (n, 3), in the file's unit."""
+        if self.kept is None:
+            raise ValueError("the coordinates were not kept")
+        return self.kept
+
+    @cached_property
+    def duplicates(self) -> int:
+        """How many points repeat the coordinates of an earlier one; they are kept."""
+        return count_duplicates(self.points)
+
+    def check_writable(self, path: str | Path) -> None:
+        """Do nothing: a table can hold whatever another one holds."""
+
+    def facts(self) -> dict[str, Any]:
+        """Return what was read, for a summary."""
+        return {
+            "file": self.source,
+            "columns": list(self.columns),
+            "rows": self.count + len(self.dropped),
+            "dropped_invalid": len(self.dropped),
+            "dropped_rows": self.dropped[:100].tolist(),
+            "duplicates": self.duplicates,
+        }
+
+    def write_parts(self, path: str | Path, make: Make) -> None:
+        """Write the table with results added, a batch at a time.
+
+        Parameters
+        ----------
+        path : path
+            Ends as one of `geounfold.io.tables.TABLE_ENDINGS`.
+        make : callable
+            See Make; called for one batch after the other, in order.
+
+        Raises
+        ------
+        InputError
+            A result would replace the coordinates, or the file has changed since it was read.
+        """
+        path = Path(path)
+        typed = self.rows.text and ending(path) == ".parquet"
+        kinds = self._kinds() if typed else {}
+        with table_writer(path) as write:
+            for frame, points, rows in self._parts():
+                results = make(frame, points, rows)
+                clash = [name for name in self.columns if name in results]
+                if clash:
+                    raise InputError(
+                        f"{self.source}: the result's column '{clash[0]}' would replace the "
+                        "coordinates read; rename the input's columns"
+                    )
+                own = {n: k for n, k in kinds.items() if n not in results}
+                write(with_columns(frame, results), own)
+
+    def _parts(self) -> Iterator[tuple[pd.DataFrame, Floats, slice]]:
+        """Yield batches: all columns, the coordinates, and which of the points they are."""
+        where = coordinate_columns(self.rows.names, self.columns, source=self.source)
+        start, row, bad = 0, 0, self.dropped - 1
+        for batch in self.rows.batches():
+            frame = batch
+            left_out = bad[(bad >= row) & (bad < row + len(frame))] - row
+            row += len(frame)
+            if len(left_out):
+                there = np.ones(len(frame), dtype=bool)
+                there[left_out] = False
+                frame = frame.loc[there].reset_index(drop=True)
+            rows = slice(start, start + len(frame))
+            points = _coordinates(frame, where, self.source, self.place)
+            start = rows.stop
+            if not len(frame):
+                continue
+            if self.kept is not None and not np.array_equal(points, self.kept[rows]):
+                break
+            yield frame, points, rows
+        if start != self.count:
+            raise InputError(f"{self.source}: has changed while it was read; run again")
+
+    def _kinds(self) -> dict[str, TextKind]:
+        """Return what each text column shows, over all rows."""
+        kinds: dict[str, TextKind] = {}
+        for frame, _, _ in self._parts():
+            for i, name in enumerate(self.rows.names):
+                seen = TextKind.of(frame.iloc[:, i])
+                kinds[name] = seen if name not in kinds else kinds[name].joined(seen)
+        return kinds
+
+
+def _coordinates(
+    frame: pd.DataFrame, where: tuple[int, ...], source: str, place: Place | None
+) -> Floats:
+    points = np.column_stack([numbers(frame.iloc[:, i], source=source) for i in where])
+    return points if place is None else place(points)
+
+
+def open_points(
+    path: str | Path,
+    columns: Triple | None = None,
+    *,
+    prefer: tuple[Triple, ...] = (),
+    drop_invalid: bool = False,
+    place: Place | None = None,
+    keep: bool = True,
+) -> PointTable | PointStream:
+    """Return the points of a file, in batches where it is large and a table.
+
+    Parameters
+    ----------
+    path, columns, prefer, drop_invalid, place
+        As for `read_points`, errors too.
+    keep : bool
+        Whether the coordinates of a large file are kept.
+    """
+    source = _large(Path(path))
+    if source is not None:
+        found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep)
+        if found is not None:
+            return found
+    return read_points(path, columns, prefer=prefer, drop_invalid=drop_invalid, place=place)
+
+
+def _large(path: Path) -> Source | None:
+    """Return what to read a large table from; None for a small, damaged or other file."""
+    kind = ending(path)
+    if kind not in TABLE_ENDINGS or not path.is_file():
+        return None
+    try:
+        if kind == ".parquet":
+            parquet = ParquetSource(path)
+            return parquet if parquet.rows > BATCH else None
+        size = path.stat().st_size * (4 if kind == ".csv.gz" else 1)
+        return CsvSource(path) if size > LARGE else None
+    except _FAULTS:  # whatever is wrong with the file, reading it whole says it
+        return None
+
+
+def _opened(
+    path: str,
+    source: Source,
+    columns: Triple | None,
+    prefer: tuple[Triple, ...],
+    drop_invalid: bool,
+    place: Place | None,
+    keep: bool,
+) -> PointStream | None:
+    """Return the points of a source; None where something is wrong, which `read_points` says."""
+    if len(set(source.names)) < len(source.names):
+        return None
+    if columns is None:
+        columns = next((p for p in prefer if set(p) <= set(source.names)), None)
+    kept: list[Floats] = []
+    dropped = [np.empty(0, np.int64)]
+    row = 0
+    try:
+        where = coordinate_columns(source.names, columns, source=path, own=place is not None)
+        for frame in source.batches(where):
+            points = _coordinates(frame, (0, 1, 2), path, place)
+            valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
+            if (np.abs(points[valid]) > LARGEST_COORDINATE).any():
+                return None
+            if not valid.all():
+                dropped.append(np.flatnonzero(~valid) + 1 + row)
+                points = points[valid]
+            row += len(frame)
+            if keep:
+                kept.append(points)
+    except _FAULTS:  # whatever is wrong with the file, reading it whole says it
+        return None
+    left_out = np.concatenate(dropped)
+    if (len(left_out) and not drop_invalid) or len(left_out) == row:
+        return None
+    a, b, c = (source.names[i] for i in where)
+    whole = np.concatenate(kept) if keep else None
+    return PointStream(path, source, (a, b, c), whole, row - len(left_out), left_out, place)

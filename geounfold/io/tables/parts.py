@@ -1,0 +1,195 @@
+"""Tables cut into parts that can be read one without the others, for many processes at once."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import InputError
+from geounfold.io.paths import ending, existing_file
+from geounfold.io.tables.csv_text import csv_reader
+from geounfold.io.tables.files import read_table
+from geounfold.io.tables.large import BATCH, CsvSource, ParquetSource
+from geounfold.io.tables.parquet import pyarrow_module
+
+BYTES = 1 << 25
+"""Of a CSV in one part, about."""
+
+_READ = 1 << 20
+_NEWLINE, _QUOTE = 10, 34
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some rows of a table.
+
+    Attributes
+    ----------
+    path : str
+        The file.
+    names : tuple of str
+        Its columns.
+    start, stop : int
+        Row groups of a Parquet file, or bytes of a CSV.
+    row : int
+        Rows of the table before this part (of a CSV, blank lines counted).
+    separator : str
+        Between a CSV's values; empty for Parquet.
+    """
+
+    path: str
+    names: tuple[str, ...]
+    start: int
+    stop: int
+    row: int
+    separator: str = ""
+
+    @property
+    def text(self) -> bool:
+        """Whether the columns are text because the file is a CSV."""
+        return bool(self.separator)
+
+    def frame(self) -> pd.DataFrame:
+        """Return the rows, every column, as `geounfold.io.read_table` would."""
+        if self.text:
+            return self._csv_frame()
+        file = pyarrow_module().parquet.ParquetFile(self.path)
+        groups = file.read_row_groups(list(range(self.start, self.stop)))
+        frame: pd.DataFrame = groups.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
+        return frame
+
+    def _csv_frame(self) -> pd.DataFrame:
+        with Path(self.path).open("rb") as stream:
+            stream.seek(self.start)
+            content = io.BytesIO(stream.read(self.stop - self.start))
+        frame = csv_reader(content, len(self.names), self.separator, 0)
+        if not isinstance(frame.index, pd.RangeIndex):
+            raise InputError(f"{self.path}: rows have more values than there are columns")
+        frame = frame.fillna("")
+        frame.columns = pd.Index(self.names, dtype=object)
+        return frame
+
+
+def parts_of(path: str | Path) -> list[Part]:
+    """Return the parts of a Parquet or CSV file, or of all such files in a folder, in order.
+
+    Raises
+    ------
+    InputError
+        No such file, another format, no table, or files whose columns differ.
+    """
+    path = Path(path)
+    files = _files(path) if path.is_dir() else [path]
+    found: list[Part] = []
+    row = 0
+    for file in files:
+        mine, rows = _split(file, row)
+        if found and mine and mine[0].names != found[0].names:
+            raise InputError(f"{file}: has other columns than {found[0].path}")
+        found += mine
+        row += rows
+    if not found:
+        raise InputError(f"{path}: the table has no rows")
+    return found
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return a folder's tables by name; those that begin with a point or a line are none."""
+    files = [f for f in sorted(folder.iterdir()) if f.is_file() and f.name[0] not in "._"]
+    endings = {ending(f) for f in files}
+    if len(endings) != 1 or not endings <= {".csv", ".parquet"}:
+        held = ", ".join(sorted(endings)) or "nothing"
+        raise InputError(f"{folder}: a folder of parts must hold .parquet or .csv, not {held}")
+    return files
+
+
+def _split(path: Path, row: int) -> tuple[list[Part], int]:
+    """Return a file's parts, and how many rows it has; ``row`` come before."""
+    kind = ending(path)
+    existing_file(path)
+    if kind not in (".csv", ".parquet"):
+        raise InputError(
+            f"{path}: cannot be read in parts; give .parquet, .csv or a folder of them"
+        )
+    try:
+        return _parquet_parts(path, row) if kind == ".parquet" else _csv_parts(path, row)
+    except (InputError, OSError, ValueError) as error:
+        read_table(path)  # which says what is wrong
+        raise InputError(f"{path}: cannot be read in parts: {error}") from error
+
+
+def _parquet_parts(path: Path, row: int) -> tuple[list[Part], int]:
+    source = ParquetSource(path)
+    names = _names(path, source.names)
+    counts = source.group_rows
+    found, start, before = [], 0, 0
+    for stop in range(1, len(counts) + 1):
+        rows = sum(counts[start:stop])
+        if rows and (rows >= BATCH or stop == len(counts)):
+            found.append(Part(str(path), names, start, stop, row + before))
+            start, before = stop, before + rows
+    return found, before
+
+
+def _csv_parts(path: Path, row: int) -> tuple[list[Part], int]:
+    source = CsvSource(path)
+    names = _names(path, source.names)
+    cuts: list[int] = []
+    rows, seen, size = [0], -source.skip, path.stat().st_size
+    for ends in _row_ends(path):
+        for end in _cuts(ends, seen, (cuts[-1] + BYTES) if cuts else 0):
+            cuts.append(int(ends[end]))
+            rows.append(seen + int(end) + 1)
+        seen += len(ends)
+    if not cuts or cuts[0] >= size:
+        return [], 0
+    if cuts[-1] < size:
+        cuts.append(size)
+    found = [
+        Part(str(path), names, a, b, row + before, source.separator)
+        for a, b, before in zip(cuts[:-1], cuts[1:], rows[1:], strict=False)
+    ]
+    return found, max(seen, 0) + 1
+
+
+def _cuts(ends: np.ndarray, seen: int, due: int) -> Iterator[int]:
+    """Yield which row ends to cut at: the header's, and then wherever a part is full.
+
+    ``seen`` rows came before, counted from the first after the header; ``due`` is the next place.
+    """
+    if seen < 0 <= seen + len(ends):
+        yield -seen - 1
+        due = int(ends[-seen - 1]) + BYTES
+    elif seen < 0:
+        return
+    while len(ends) and ends[-1] >= due:
+        at = int(np.searchsorted(ends, due))
+        yield at
+        due = int(ends[at]) + BYTES
+
+
+def _row_ends(path: Path) -> Iterator[np.ndarray]:
+    """Yield, piece by piece of a CSV, where its rows end: behind newlines outside quotes."""
+    at, quoted = 0, 0
+    with path.open("rb") as stream:
+        while chunk := stream.read(_READ):
+            letters = np.frombuffer(chunk, dtype=np.uint8)
+            ends = np.flatnonzero(letters == _NEWLINE)
+            quotes = np.flatnonzero(letters == _QUOTE)
+            if len(quotes) or quoted:
+                before = np.searchsorted(quotes, ends) + quoted
+                ends = ends[before % 2 == 0]
+            quoted = (quoted + len(quotes)) % 2
+            yield ends + at + 1
+            at += len(chunk)
+
+
+def _names(path: Path, names: list[str]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: two columns are called alike; rename all but one")
+    return tuple(names)

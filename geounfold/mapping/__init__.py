@@ -1,0 +1,1 @@
+"""Maps between the folded and the flat space: control mesh, certificate, map file."""

@@ -1,0 +1,332 @@
+"""Carry points through a control mesh, both ways, and keep the map in a small file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from geounfold.backends.igl import TetIndex, barycentric_in_tets
+from geounfold.backends.threads import over_slices, slices
+from geounfold.body.working_frame import Frame
+from geounfold.errors import OptionError
+from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers, TetMesh
+from geounfold.mapping.carried import Carried, Returned, checked_points
+from geounfold.mapping.control_mesh import ControlMesh
+from geounfold.mapping.distortion import deformation_gradients
+from geounfold.mapping.map_file import read_arrays, write_arrays
+from geounfold.mapping.mesh_space import MeshImage, MeshSpace
+from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
+
+REACH = 3.0
+"""How far past the control mesh points are carried, in blocks, where nothing else is asked for."""
+
+
+_SLICE = 1 << 14  # points that a thread carries at once: they stay in its cache
+
+
+_MISSED = 1 << 18  # points that libigl places at once
+
+
+class UnfoldingMap:
+    """A fitted unfolding: carries any points to the flat space and back.
+
+    Points of the control mesh, and of the shell around it, go there and back exactly: both are
+    the same tetrahedra in either space, none of which overlap where the map is certified.  A
+    control mesh without a shell is continued by its nearest element, which is no such map: a
+    point outside comes back to another place.  What lies farther than the reach has no image.
+
+    Parameters
+    ----------
+    frame : Frame
+        Working frame of the control mesh.
+    control : ControlMesh
+        In working units.
+    shell : ControlMesh, optional
+        Tetrahedra around it; its first vertices are those of the control mesh.
+    reach : float
+        Largest distance from the control mesh at which points are carried, in working units
+        (blocks).  A shell may end nearer, where limbs or a hinge's inner side leave no room.
+    known : sequence of TetIndex, optional
+        Trees already built, used where they are over a space of the control mesh.
+    coordinates : str
+        ``tet``: the map is affine in every tetrahedron.  ``wachspress`` or ``mvc``: points in
+        prisms go by coordinates of the prism's corners, which is smooth inside; the inverse is
+        found by Newton's method to 1e-12 of the mesh's size.
+
+    Raises
+    ------
+    OptionError
+        Unknown coordinates.
+    """
+
+    def __init__(
+        self,
+        frame: Frame,
+        control: ControlMesh,
+        shell: ControlMesh | None = None,
+        reach: float = REACH,
+        known: Sequence[TetIndex] = (),
+        coordinates: str = "tet",
+    ) -> None:
+        if coordinates not in COORDINATES:
+            valid = ", ".join(COORDINATES)
+            raise OptionError(f"unknown coordinates {coordinates!r}; valid: {valid}")
+        self.coordinates = coordinates
+        self.frame = frame
+        self.control = control
+        self.shell = shell
+        self.reach = reach
+        self._known = tuple(known)
+
+    @cached_property
+    def _folded(self) -> MeshSpace:
+        shell = None if self.shell is None else self.shell.folded
+        return MeshSpace(self.control.folded, shell, self.reach, self._known)
+
+    @cached_property
+    def _unfolded(self) -> MeshSpace:
+        shell = None if self.shell is None else self.shell.unfolded
+        return MeshSpace(self.control.unfolded, shell, self.reach, self._known)
+
+    @cached_property
+    def whole(self) -> ControlMesh:
+        """The control mesh and its shell as one."""
+        if self.shell is None:
+            return self.control
+        T = np.concatenate([self.control.folded.T, self.shell.folded.T])
+        return ControlMesh(
+            TetMesh(self.shell.folded.V, T),
+            TetMesh(self.shell.unfolded.V, T),
+            self.shell.stratigraphic,
+        )
+
+    @cached_property
+    def prisms(self) -> PrismInterpolant | None:
+        """The prisms and their coordinates; None where the tetrahedra carry all points."""
+        if self.coordinates == "tet":
+            return None
+        return PrismInterpolant.of(self.whole, self.coordinates)
+
+    def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
+        """Carry points to the flat space, or with ``inverse`` from it back.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Folded points in the data's coordinates; with ``inverse`` unfolded points, whose
+            empty rows (all NaN: no image) stay empty.
+        inverse : bool
+            Direction.
+
+        Returns
+        -------
+        Carried
+
+        Raises
+        ------
+        InputError
+            Points of another shape, or not finite.
+        """
+        P = np.ascontiguousarray(points, dtype=np.float64)
+        if inverse and P.ndim == 2 and np.isnan(P).any():
+            there: Bools = np.logical_not(np.isnan(P).all(axis=1))
+            return self.carry(P[there], inverse=True).spread(there)
+        P = checked_points(P)
+        n = len(P)
+        space, image = (self._unfolded, self._fold) if inverse else (self._folded, self._unfold)
+        out = Carried(
+            points=np.empty((n, 3)),
+            stratigraphic=np.empty(n),
+            inside=np.empty(n, bool),
+            placed=np.empty(n, bool),
+            element=np.empty(n, np.int64),
+            distance=np.zeros(n),
+        )
+
+        def fill(rows: slice | Ints, place: Ints | Numbers, weights: Sequence[Floats]) -> None:
+            x, y, z, height = image(np.maximum(place, 0), *weights)
+            out.points[rows] = self._from_work(x, y, z, inverse=inverse)
+            out.stratigraphic[rows] = height
+            out.element[rows] = place
+
+        def walk(rows: slice) -> None:
+            place, weights = space.walk.locate(*self._to_work(P[rows], inverse=inverse))
+            fill(rows, place, list(weights))
+            out.inside[rows] = out.placed[rows] = place >= 0
+
+        over_slices(walk, n, _SLICE)
+        missed = np.flatnonzero(~out.inside)
+        for part in slices(len(missed), _MISSED):
+            rows = missed[part]
+            work = np.stack(self._to_work(P[rows], inverse=inverse), axis=1)
+            found = space.locate(work)
+            fill(rows, found.element, list(found.weights.T[1:]))
+            out.inside[rows], out.placed[rows] = found.inside, found.element >= 0
+            out.distance[rows] = found.distance * self.frame.scale
+        empty = missed[~out.placed[missed]]
+        out.points[empty] = np.nan
+        out.stratigraphic[empty] = np.nan
+        if self.prisms is None:
+            return out
+        return replace(out, unsolved=self._by_prisms(self.prisms, P, out, inverse=inverse))
+
+    def _by_prisms(
+        self, prisms: PrismInterpolant, points: Floats, carried: Carried, *, inverse: bool
+    ) -> int:
+        """Put what prisms carry in the place of the tetrahedra's answer; count the unsolved."""
+        mesh = self.whole.unfolded if inverse else self.whole.folded
+        placed, unsolved = np.flatnonzero(carried.placed), 0
+        for part in slices(len(placed), _MISSED):
+            rows = placed[part]
+            work = np.stack(self._to_work(points[rows], inverse=inverse), axis=1)
+            element = carried.element[rows]
+            share = barycentric_in_tets(work, mesh.V, mesh.T[element])
+            held = prisms.held(element, share)
+            rows, work, element = rows[held], work[held], element[held]
+            if inverse:
+                start = self.frame.to_work(carried.points[rows])
+                image, height, solved = prisms.back(work, element, start)
+            else:
+                image, height = prisms.carry(work, element)
+                solved = np.ones(len(rows), dtype=bool)
+            carried.points[rows] = self._from_work(*image.T, inverse=inverse)
+            carried.stratigraphic[rows] = height
+            lost = rows[~solved]
+            carried.points[lost], carried.stratigraphic[lost] = np.nan, np.nan
+            carried.placed[lost] = False
+            unsolved += len(lost)
+        return unsolved
+
+    def returned(self, points: Floats, carried: Carried) -> Returned:
+        """Return how points come back from where they were carried.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In the data's coordinates.
+        carried : Carried
+            As ``carry`` gave them.
+        """
+        largest, lost = 0.0, np.zeros(len(points), dtype=bool)
+        for rows in slices(len(points), _MISSED):
+            back = self.carry(carried.points[rows], inverse=True)
+            lost[rows] = back.inside & ~back.placed
+            placed = carried.placed[rows] & ~lost[rows]
+            away = np.linalg.norm(back.points[placed] - points[rows][placed], axis=1)
+            largest = max(largest, float(away.max(initial=0.0)))
+        return Returned(largest, lost)
+
+    @cached_property
+    def _unfold(self) -> MeshImage:
+        return MeshImage(self.whole.unfolded, self.whole.stratigraphic)
+
+    @cached_property
+    def _fold(self) -> MeshImage:
+        return MeshImage(self.whole.folded, self.whole.stratigraphic)
+
+    def _to_work(self, points: Floats, *, inverse: bool) -> tuple[Floats, Floats, Floats]:
+        """Return x, y, z in the working frame of points (k, 3) of either space."""
+        if not inverse:
+            return self.frame.work_columns(points)
+        x, y, z = (np.ascontiguousarray(column) for column in (points / self.frame.scale).T)
+        return x, y, z
+
+    def _from_work(self, x: Floats, y: Floats, z: Floats, *, inverse: bool) -> Floats:
+        """Return points (k, 3) of the other space from their working coordinates."""
+        points = np.stack([x, y, z], axis=1)
+        return self.frame.to_world(points) if inverse else points * self.frame.scale
+
+    def gradients(self, points: Floats, element: Ints) -> Floats:
+        """Return the deformation gradient at folded points, folded to unfolded.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In the data's coordinates.
+        element : (n,) int
+            The tetrahedron that carries each (see Carried), none of them -1.
+
+        Returns
+        -------
+        (n, 3, 3) float
+            As ``deformation_gradients``, folded directions in the working frame; that of the
+            prism's coordinates where a prism carries the point.
+        """
+        used, back = np.unique(element, return_inverse=True)
+        out = deformation_gradients(self.whole, used)[back]
+        if self.prisms is not None and len(points):
+            work, folded = self.frame.to_work(points), self.whole.folded
+            share = barycentric_in_tets(work, folded.V, folded.T[element])
+            rows = self.prisms.held(element, share)
+            out[rows] = self.prisms.gradients(work[rows], element[rows])
+        return out
+
+    def to_flat(self, points: Floats) -> Floats:
+        """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
+        return self.carry(points).points
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Return flat points (n, 3) in the folded space, the data's; NaN beyond the reach."""
+        return self.carry(points, inverse=True).points
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the map as .npz without pickles: control mesh, frame, version, checksum."""
+        write_arrays(path, self._arrays())
+
+    def __reduce__(self) -> tuple[Callable[..., UnfoldingMap], tuple[dict[str, np.ndarray]]]:
+        """Pickle as plain arrays: trees and tables are made anew where they are needed."""
+        return _of_arrays, (self._arrays(),)
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        frame, whole = self.frame, self.whole
+        count = len(self.control.folded.T)
+        return {
+            "origin": frame.origin,
+            "rotation": frame.rotation,
+            "scale": np.array(frame.scale),
+            "steps": np.full(3, np.nan) if frame.steps is None else frame.steps,
+            "reach": np.array(self.reach),
+            "coordinates": np.array(COORDINATES.index(self.coordinates)),
+            "folded": whole.folded.V,
+            "unfolded": whole.unfolded.V,
+            "inner": np.array(len(self.control.folded.V)),
+            "tetrahedra": self.control.folded.T,
+            "shell": whole.folded.T[count:],
+            "stratigraphic": whole.stratigraphic,
+        }
+
+
+def load(path: str | Path) -> UnfoldingMap:
+    """Read a map written by ``save``.
+
+    Raises
+    ------
+    InputError
+        No such file, not a map, of another version, or damaged.
+    """
+    return _of_arrays(read_arrays(path))
+
+
+def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:
+    """Return the map that such arrays keep."""
+    steps = arrays["steps"]
+    frame = Frame(
+        arrays["origin"],
+        arrays["rotation"],
+        float(arrays["scale"]),
+        None if np.isnan(steps).any() else steps,
+    )
+    T, S = arrays["tetrahedra"].astype(np.int64), arrays["shell"].astype(np.int64)
+    whole = [arrays["folded"], arrays["unfolded"], arrays["stratigraphic"]]
+    core = [a[: int(arrays["inner"])] for a in whole]
+    control = ControlMesh(TetMesh(core[0], T), TetMesh(core[1], T), core[2])
+    shell = None
+    if len(S):
+        shell = ControlMesh(TetMesh(whole[0], S), TetMesh(whole[1], S), whole[2])
+    coordinates = COORDINATES[int(arrays["coordinates"])]
+    return UnfoldingMap(frame, control, shell, float(arrays["reach"]), coordinates=coordinates)

@@ -1,0 +1,141 @@
+"""A map by a rule for single points, carried and counted like one by a control mesh."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.body.working_frame import Frame
+from geounfold.errors import InputError, OptionError
+from geounfold.geometry.mesh import Bools, Floats
+from geounfold.mapping.carried import Carried, Returned, checked_points
+from geounfold.methods.contract import Pointwise
+
+
+class PointwiseMap:
+    """A fitted unfolding without a control mesh: carries points, and proves nothing.
+
+    Parameters
+    ----------
+    name : str
+        The method's.
+    frame : Frame
+        Working frame.
+    rule : Pointwise
+        The map, in working units.
+    blocks : (b, 3) float
+        The body, working units: a point is inside where a block holds it, to half a block's
+        diagonal, and has no image farther off than the reach.
+    reach : float
+        How far past the body points are carried, in blocks.
+    """
+
+    coordinates = "tet"
+    prisms = None
+
+    def __init__(
+        self, name: str, frame: Frame, rule: Pointwise, blocks: Floats, reach: float
+    ) -> None:
+        self.name = name
+        self.frame = frame
+        self.rule = rule
+        self.reach = reach
+        self._blocks = blocks
+        steps = np.ones(3) if frame.sides is None else frame.sides
+        self._half = float(np.linalg.norm(steps)) / 2
+
+    @property
+    def fault(self) -> str:
+        """Why the map is not proved one-to-one."""
+        return f"method {self.name} has no control mesh: nothing is proved"
+
+    @cached_property
+    def _folded(self) -> cKDTree:
+        return cKDTree(self._blocks)
+
+    @cached_property
+    def _flat(self) -> cKDTree:
+        points = self.rule.to_flat(self._blocks).points
+        return cKDTree(points[np.isfinite(points).all(axis=1)])
+
+    def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
+        """Carry points to the flat space, or with ``inverse`` from it back.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Folded points in the data's coordinates; with ``inverse`` unfolded points, whose
+            empty rows (all NaN: no image) stay empty.
+        inverse : bool
+            Direction.
+
+        Returns
+        -------
+        Carried
+            ``inside``: within the body, and where its surfaces are; ``element`` is -1 everywhere.
+            On the way back nothing is said of the stratigraphic coordinate.
+
+        Raises
+        ------
+        InputError
+            Points of another shape, or not finite; a method that has no way back.
+        """
+        if inverse and not self.rule.way_back:
+            raise InputError(f"method {self.name} has no way back: use --method sheet")
+        P = np.ascontiguousarray(points, dtype=np.float64)
+        there: Bools = np.ones(len(P), dtype=bool)
+        if inverse and P.ndim == 2:
+            there = np.logical_not(np.isnan(P).all(axis=1))
+        P = checked_points(P[there])
+        work = P / self.frame.scale if inverse else self.frame.to_work(P)
+        tree = self._flat if inverse else self._folded
+        distance = np.maximum(np.asarray(tree.query(work)[0], dtype=np.float64) - self._half, 0)
+        if inverse:
+            image = self.rule.to_folded(work)
+            share, anchored = np.full(len(P), np.nan), np.ones(len(P), dtype=bool)
+            out = self.frame.to_world(image)
+        else:
+            placed = self.rule.to_flat(work)
+            share, anchored = placed.stratigraphic, placed.anchored
+            out = placed.points * self.frame.scale
+        good = np.isfinite(out).all(axis=1) & (distance <= self.reach)
+        out[~good] = np.nan
+        share = np.where(good, share, np.nan)
+        inside = good & anchored & (distance == 0)
+        return Carried(out, share, inside, good, _none(P), distance * self.frame.scale).spread(
+            there
+        )
+
+    def returned(self, points: Floats, carried: Carried) -> Returned | None:
+        """Return how points (n, 3) come back from where they were carried, None without a way."""
+        if not self.rule.way_back:
+            return None
+        back = self.carry(carried.points, inverse=True)
+        both = carried.placed & back.placed
+        away = np.linalg.norm(back.points[both] - points[both], axis=1)
+        return Returned(float(away.max(initial=0.0)), carried.placed & ~back.placed)
+
+    def to_flat(self, points: Floats) -> Floats:
+        """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
+        return self.carry(points).points
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Return flat points (n, 3) in the folded space, the data's; NaN beyond the reach."""
+        return self.carry(points, inverse=True).points
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Raise OptionError: what is saved is a control mesh."""
+        raise OptionError(no_mesh(self.name, "its map cannot be saved"))
+
+
+def no_mesh(method: str, what: str) -> str:
+    """Return the sentence that says what cannot be had without a control mesh."""
+    return f"method {method} has no control mesh, so {what}: use --method sheet"
+
+
+def _none(P: Floats) -> np.ndarray:
+    return np.full(len(P), -1, dtype=np.int64)

@@ -1,0 +1,1 @@
+"""The sheet method: a spline mid surface, flattened, with prisms along its normals."""

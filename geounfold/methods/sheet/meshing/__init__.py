@@ -1,0 +1,1 @@
+"""Meshing: the control mesh of prisms around the mid surface."""

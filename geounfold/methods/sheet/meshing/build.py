@@ -1,0 +1,427 @@
+"""The control mesh of a fitted sheet: footprint, flattening, offsets, repair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from geounfold.backends.igl import SurfaceIndex
+from geounfold.flattening._result import Flattening
+from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.mapping.control_mesh import ControlMesh, Datum
+from geounfold.methods.sheet.meshing.footprint import Footprint, footprint, principal_direction
+from geounfold.methods.sheet.meshing.prism_columns import Columns
+from geounfold.methods.sheet.meshing.prism_layers import (
+    FINE_FRACTIONS,
+    FRACTIONS,
+    Layers,
+    bounded_slope,
+)
+from geounfold.methods.sheet.meshing.repair import Rung, climb
+from geounfold.methods.sheet.meshing.top_and_bottom import Horizons
+from geounfold.methods.sheet.mid_surface.fit import FittedSheet
+from geounfold.methods.sheet.mid_surface.pin_line import CrossSection, fold_axes
+from geounfold.methods.sheet.mid_surface.surface import (
+    Foot,
+    MidSurface,
+    normals,
+    principal_curvatures,
+)
+
+Flatten = Callable[[TriMesh, Floats | None], Flattening]
+"""``flatten(mesh, start)``: a surface laid flat from a start, (n, 2) or None."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlOptions:
+    """Shape of the control mesh; lengths in blocks.
+
+    ``cell``: side of the footprint's cells, and ``widest``, ``turn``, ``many``: on footprints of
+    more cells than ``many`` cells grow up to the widest while the surface turns by no more than
+    ``turn`` radians over one; ``turn_merged``: the same where blocks were merged, and cells are
+    as much wider as allows; ``dilation``: rings of cells past the blocks;
+    ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
+    where they vary; ``focal``: largest share of the focal distance, ``focal_refined``: the same
+    with cells of half the side; ``slopes``: of the caps along the sheet, tried in order;
+    ``slope``: the offset surfaces that are flattened lie within this share of the caps;
+    ``reach``: radius, in cells, of the filter on varying offsets;
+    ``shrinks``: most steps of the repair; ``shell``: how far the shell reaches past the mesh.
+    """
+
+    cell: float = 1.5
+    widest: float = 3.0
+    turn: float = 0.1
+    many: int = 8000
+    turn_merged: float = 0.25
+    dilation: int = 1
+    pad: float = 0.6
+    pad_capped: float = 1.0
+    focal: float = 0.9
+    slope: float = 0.7
+    reach: int = 3
+    slopes: tuple[float, ...] = (0.3, 0.6, 1.2)
+    focal_refined: float = 0.95
+    shrinks: int = 40
+    shell: float = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class SheetMesh:
+    """What the sheet method made of a body, in working units.
+
+    Attributes
+    ----------
+    control : ControlMesh
+        Tetrahedra in both spaces.
+    shell : ControlMesh or None
+        Tetrahedra around them, over the control mesh's vertices and others.
+    flattenings : dict of Flattening
+        The mid surface (``mid``) and the parallel surfaces above and below it (``top``,
+        ``bottom``), over the same footprint, as they were flattened.
+    layers : Layers
+        The prisms.
+    rungs : tuple of Rung
+        What every rung of the ladder gave that was needed; the last is the one taken.
+    surfaces : dict of (TriMesh, TriMesh)
+        Mid, top and bottom surface, folded and unfolded, over the footprint.
+    """
+
+    control: ControlMesh
+    shell: ControlMesh | None
+    flattenings: dict[str, Flattening]
+    layers: Layers
+    rungs: tuple[Rung, ...]
+    surfaces: dict[str, tuple[TriMesh, TriMesh]]
+
+    @property
+    def sound(self) -> bool:
+        """Whether some rung was proved and lost no block."""
+        return any(not rung.flaws and rung.lost == 0 for rung in self.rungs)
+
+
+def register(A: Floats, B: Floats, weight: Floats) -> Floats:
+    """Return A (n, 2) moved rigidly, never mirrored, onto B (n, 2) by weighted least squares."""
+    w = weight / weight.sum()
+    a, b = w @ A, w @ B
+    u, _, vt = np.linalg.svd(((A - a) * w[:, None]).T @ (B - b))
+    d = np.sign(np.linalg.det(u @ vt))
+    out: Floats = (A - a) @ (u @ np.diag([1.0, d]) @ vt) + b
+    return out
+
+
+def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
+    """Return the feet of all blocks, each on its own limb (see FittedSheet.own_feet)."""
+    return fitted.own_feet(points, (reach / 5, reach / 2, reach))
+
+
+@dataclass(frozen=True, eq=False)
+class _Nodes:
+    """Places of the control mesh's nodes on the normals of the mid surface, (n, 3) each.
+
+    A mesh whose nodes lie on a curved surface is shorter than it, and lies on its inner side.
+    Nodes lifted by 1/24 of the second difference over a cell have chords as long as the arcs;
+    lifted by 1/12, the flat cells have the arcs' mean height (Simpson's rule).  The points at
+    height t are ``P + t normal`` of either pair.
+    """
+
+    chord_points: Floats
+    chord_normal: Floats
+    mean_points: Floats
+    mean_normal: Floats
+
+
+def _lifted_nodes(sheet: MidSurface, U: Floats, prints: Footprint) -> _Nodes:
+    """Return the nodes of both kinds at parameters U (n, 2) of a footprint's grid."""
+    jet = sheet.jet(U)
+    P, normal = jet.value, normals(jet)
+    bend_P, bend_n = np.zeros_like(P), np.zeros_like(P)
+    for axis in prints.axes * prints.cell:
+        for step in (axis, -axis):
+            near = sheet.jet(U + step)
+            bend_P += near.value - P
+            bend_n += normals(near) - normal
+    return _Nodes(P - bend_P / 24, normal - bend_n / 24, P - bend_P / 12, normal - bend_n / 12)
+
+
+@dataclass(frozen=True, eq=False)
+class _FlatSheet:
+    """The mid surface at the footprint's nodes, flat, with slopes above and below."""
+
+    flat: Floats
+    slopes: tuple[Floats, Floats]
+    flattenings: dict[str, Flattening]
+
+    @property
+    def flips(self) -> int:
+        return sum(f.flips for f in self.flattenings.values())
+
+
+def _flatten_sheet(
+    nodes: _Nodes,
+    prints: Footprint,
+    profile: CrossSection,
+    slip: Floats,
+    reach: tuple[float, float],
+    flatten: Flatten,
+) -> _FlatSheet:
+    """Flatten the mid surface and the parallel surfaces ``reach`` above and below it.
+
+    The fitted ``slip`` (n, 2) per height is the start of the latter two; their mean slip over
+    the ``profile`` is none.
+    """
+    n = len(prints.U)
+    P, normal = nodes.chord_points[:n], nodes.chord_normal[:n]
+    middle = flatten(TriMesh(P, prints.F), prints.U)
+    mid = register(middle.uv, prints.U, prints.weight)
+    above = flatten(TriMesh(P + reach[0] * normal, prints.F), mid - reach[0] * slip)
+    below = flatten(TriMesh(P - reach[1] * normal, prints.F), mid + reach[1] * slip)
+    slopes = []
+    for f, q in zip((above, below), reach, strict=True):
+        slope = (register(f.uv, mid, prints.weight) - mid) / q
+        slopes.append(slope - profile.mean(slope, prints.U, prints.weight, prints.cell))
+    flattenings = {"mid": middle, "top": above, "bottom": below}
+    return _FlatSheet(mid, (slopes[0], slopes[1]), flattenings)
+
+
+def _safely_flat(
+    nodes: _Nodes,
+    prints: Footprint,
+    profile: CrossSection,
+    slip: Floats,
+    reach: tuple[float, float],
+    flatten: Flatten,
+) -> _FlatSheet:
+    """Flatten at the full reach, or nearer to the mid surface where that would fold over.
+
+    Slip is linear in height on a developable sheet, so nearer surfaces give the same slopes.
+    """
+    for share in (1.0, 0.6, 0.35, 0.2):
+        near = (share * reach[0], share * reach[1])
+        result = _flatten_sheet(nodes, prints, profile, slip, near, flatten)
+        if not result.flips:
+            break
+    return result
+
+
+_OFF = 1e-3  # blocks: rays towards other limbs start so far off the walls
+_HALF = 0.45  # of the way to another limb that a limb may take
+_TIP = 1.5  # blocks before the end of the sheet whose thickness is taken for the tip's
+_FARTHEST = 8.0  # blocks past the last one that a sheet may go on, too thin for blocks
+_STRAIGHT = 1e-9  # curvature below which a surface has no focal distance to speak of
+
+
+def _focal_caps(curvature: Floats, focal: float) -> Floats:
+    return np.asarray(focal / np.maximum(curvature, _STRAIGHT))
+
+
+def _offsets(columns: Columns, foot: Foot, caps: Floats, options: ControlOptions) -> Floats:
+    """Return offsets (2, n) that follow the blocks under caps (2, n)."""
+    prints, use = columns.prints, foot.miss < 0.5
+    need = [prints.cell_max(s * foot.t, use) for s in (1.0, -1.0)]
+    follow = [prints.at_nodes(q, options.reach) + options.pad_capped for q in need]
+    return np.minimum(np.stack(follow), caps)
+
+
+def _room(columns: Columns, share: float) -> Floats:
+    """Return how far normals may run above and below, (2, n).
+
+    A share of the way to where they meet their neighbours; and, past top and bottom, not quite
+    half of the way to another limb.
+    """
+    P, normal = (a[: columns.count] for a in (columns.P, columns.normal))
+    sides = (columns.high, columns.low)
+    walls = [P + height[:, None] * normal for height in sides]
+    F, n = columns.prints.F, columns.count
+    index = SurfaceIndex(np.concatenate(walls), np.concatenate([F, F + n]))
+    room = _focal_caps(columns.curvature[:, :n], share)
+    for k, (side, wall, height) in enumerate(zip((1.0, -1.0), walls, sides, strict=True)):
+        out = side * normal
+        gap = index.first_hit(wall + _OFF * out, out)[1]
+        room[k] = np.minimum(room[k], side * height + _HALF * gap)
+    return room
+
+
+def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
+    """Return caps (2, n) on the offsets: the room there is, of bounded slope.
+
+    At a hinge the mesh's border has to run on nearly parallel to the sheet: where it dips
+    towards a focal line and out again, columns cross those two away.
+    """
+    F, U = columns.prints.F, columns.prints.U
+    return np.stack([bounded_slope(cap, U, F, slope) for cap in _room(columns, share)])
+
+
+def _footprint(
+    sheet: MidSurface, U: Floats, options: ControlOptions, unit: float, side: float | None
+) -> Footprint:
+    """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow.
+
+    ``unit``: side of the cells that blocks were merged into, 1 where they were not; ``side``:
+    that of the footprint's cells, where it is not left to size and bends.
+    """
+    angle = principal_direction(sheet, U)
+
+    def prints_of(cell: float) -> Footprint:
+        rings = int(np.ceil(options.shell / cell))
+        return footprint(U, angle, cell, options.dilation, rings)
+
+    start = options.cell if side is None else side
+    if side is None and unit > 1:
+        start = float(np.clip(options.turn_merged / _bend(sheet, U), start, start * unit))
+    prints = prints_of(start)
+    if side is not None or len(prints.F) <= 2 * options.many:
+        return prints
+    cell = min(options.widest, options.turn / _bend(sheet, prints.U))
+    return prints_of(cell) if cell > start else prints
+
+
+def _bend(sheet: MidSurface, U: Floats) -> float:
+    """Return the curvature that one in a hundred places U (n, 2) exceeds."""
+    k1, k2 = principal_curvatures(sheet.jet(U))
+    return max(float(np.percentile(np.maximum(k1, -k2), 99)), 1e-9)
+
+
+def _columns(
+    fitted: FittedSheet,
+    horizons: Horizons,
+    foot: Foot,
+    cell: float | None,
+    flatten: Flatten,
+    options: ControlOptions,
+    datum: str,
+) -> Columns:
+    """Return the columns over the blocks' footprint; ``cell`` None chooses its cells' side."""
+    sheet = fitted.sheet
+    prints = _footprint(sheet, foot.U, options, fitted.unit, cell)
+    every = np.concatenate([prints.U, prints.ring.U])
+    k1, k2 = principal_curvatures(sheet.jet(every))
+    curvature = np.stack([k1, -k2])
+    n = len(prints.U)
+    reach = _reach(foot, options)
+    caps = _focal_caps(curvature[:, :n], options.focal)
+    safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
+    nodes = _lifted_nodes(sheet, every, prints)
+    slip = sheet.grid.value(fitted.slip, every)
+    flat = _safely_flat(
+        nodes, prints, _profile(fitted, foot), slip[:n], (safe[0], safe[1]), flatten
+    )
+    bottom, top = horizons.crossings(prints.U, slip[:n], limit=2 * reach)
+    means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
+    return Columns(
+        prints=prints,
+        P=nodes.mean_points,
+        normal=nodes.mean_normal,
+        slip=slip,
+        flat=flat.flat,
+        slope_up=flat.slopes[0],
+        slope_down=flat.slopes[1],
+        curvature=curvature,
+        low=bottom,
+        high=top,
+        flattenings=flat.flattenings,
+        horizons=horizons,
+        datum=Datum(datum, means[0], means[1]),
+        reach=options.shell,
+    )
+
+
+def _profile(fitted: FittedSheet, foot: Foot) -> CrossSection:
+    """Return the sections of the mid surface.
+
+    They reach as far as the blocks within one block of it did before they slipped; and on from
+    there to where a layer that tapers comes to nothing, which is too thin for a block.
+    """
+    axes = fold_axes(fitted.sheet, foot.U)
+    near = np.flatnonzero(np.abs(foot.t) < 1)
+    near = near if len(near) else np.arange(len(foot.t))
+    U = foot.U[near]
+    U = U - foot.t[near, None] * fitted.sheet.grid.value(fitted.slip, U)
+    stations = U @ axes.T
+    span = np.empty((2, 2))
+    for k, axis in enumerate(axes):
+        for side, sign in enumerate((-1.0, 1.0)):
+            x = sign * stations[:, k]
+            end = float(x.max())
+            half, hu, hv = fitted.sheet.grid.gradient(fitted.half, U[x > end - _TIP])
+            taper = -sign * float(np.median(hu * axis[0] + hv * axis[1]))
+            left = max(float(np.median(half)) - taper * _TIP / 2, 0.0)
+            on = left / taper if left < 1 and taper > left / _FARTHEST else 0.5
+            span[side, k] = sign * (end + max(on, 0.5))
+    return CrossSection(axes, span)
+
+
+def _reach(foot: Foot, options: ControlOptions) -> float:
+    """Return the offset that holds every block."""
+    return float(np.abs(foot.t[foot.miss < 0.5]).max()) + options.pad
+
+
+def build_control(
+    fitted: FittedSheet,
+    horizons: Horizons,
+    points: Floats,
+    blocks: Floats,
+    flatten: Flatten,
+    options: ControlOptions,
+    datum: str = "mid",
+) -> SheetMesh:
+    """Return the control mesh that holds the blocks, in both spaces (see SheetMesh).
+
+    Prism edges are normals of the mid surface; surfaces parallel to it above and below are
+    flattened on their own and registered rigidly to the flat mid surface, which reproduces
+    flexural slip with zero mean slip over the profile (the pin line).
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Mid surface.
+    horizons : Horizons
+        Top and bottom, for the stratigraphic coordinate.
+    points : (n, 3) float
+        What the sheet was fitted to, working units.
+    blocks : (b, 3) float
+        Blocks as they were given, which the mesh has to hold.
+    flatten : callable
+        See Flatten.
+    options : ControlOptions
+        See there.
+    datum : str
+        Which surface is flat; see Datum.
+    """
+    foot = block_feet(fitted, points, reach=10.0 * fitted.unit)
+    columns = _columns(fitted, horizons, foot, None, flatten, options, datum)
+    reach = _reach(foot, options)
+
+    def constant() -> tuple[Columns, Layers]:
+        offsets = np.full((2, columns.count), reach)
+        return columns, columns.layers(offsets, FRACTIONS)
+
+    def capped(slope: float) -> tuple[Columns, Layers]:
+        caps = _sloping_caps(columns, options.focal, slope)
+        return columns, columns.layers(_offsets(columns, foot, caps, options), FRACTIONS)
+
+    def refined() -> tuple[Columns, Layers]:
+        cell = columns.prints.cell / 2
+        finer = _columns(fitted, horizons, foot, cell, flatten, options, datum)
+        caps = _sloping_caps(finer, options.focal_refined, options.slopes[-1])
+        return finer, finer.layers(_offsets(finer, foot, caps, options), FINE_FRACTIONS)
+
+    rungs: list[tuple[str, Callable[[], tuple[Columns, Layers]]]]
+    rungs = [("capped", partial(capped, slope)) for slope in options.slopes]
+    rungs.append(("refined", refined))
+    if not (_room(columns, options.focal) < reach).any():
+        rungs.insert(0, ("constant", constant))
+    climbed = climb(rungs, blocks, options.shrinks)
+    columns, laid = climbed.columns, climbed.laid
+    heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
+    surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}
+    return SheetMesh(
+        control=laid.control(),
+        shell=laid.shell_mesh(),
+        flattenings=columns.flattenings,
+        layers=laid.layers,
+        rungs=climbed.rungs,
+        surfaces=surfaces,
+    )

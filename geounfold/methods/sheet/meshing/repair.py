@@ -1,0 +1,289 @@
+"""From offsets to a control mesh that is proved one-to-one: the rungs, and what each gave.
+
+Every rung lays the prisms out and examines them as the certificate does: exact volumes in both
+spaces, a boundary that does not cross itself.  The first that has no flaw is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geounfold.backends.igl import TetIndex
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.untangle import untangle
+from geounfold.mapping.certificate import Gluing, SpaceFlaws, examine
+from geounfold.methods.sheet.meshing.prism_columns import Columns, Laid
+from geounfold.methods.sheet.meshing.prism_layers import (
+    Layers,
+    bounded_slope,
+    neighbour_mean,
+    shrink,
+)
+from geounfold.methods.sheet.meshing.shell import less
+from geounfold.methods.sheet.meshing.tents import with_tents
+
+_BLENDS = 8  # rounds of falling back to nearer offsets
+_BLEND = 0.6  # largest slope of the offsets between the two
+_MOVABLE = 0.03  # share of the vertices beyond which nothing is untangled
+_FEW = 0.002  # share of the blocks in the shell up to which they are taken into the body
+_TENTS = 0.02  # share of the blocks up to which tents are raised over them
+_TRIMS = 8  # rounds of trimming before the shell is given up
+
+
+@dataclass(frozen=True)
+class Rung:
+    """What one rung of the ladder gave.
+
+    Attributes
+    ----------
+    name : str
+        constant, capped or refined as laid out; blended, untangled or shrunk where mended.
+    inverted_folded, inverted_unfolded, crossing_folded, crossing_unfolded, unglued : int
+        Flaws of the body's tetrahedra: how many are inverted, pairs of border faces that cross,
+        vertices and tetrahedra where they are not glued to a manifold.
+    outside, lost : int or None
+        Blocks that they do not hold, and those that the shell does not hold either; None where
+        that was not asked.
+    steps : int
+        Steps of blending or shrinking it took, or vertices it started to untangle from.
+    """
+
+    name: str
+    inverted_folded: int
+    inverted_unfolded: int
+    crossing_folded: int
+    crossing_unfolded: int
+    unglued: int
+    outside: int | None = None
+    lost: int | None = None
+    steps: int = 0
+
+    @property
+    def flaws(self) -> int:
+        """How many flaws were left."""
+        return (
+            self.inverted_folded
+            + self.inverted_unfolded
+            + self.crossing_folded
+            + self.crossing_unfolded
+            + self.unglued
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Climbed:
+    """The ladder's result: the prisms taken, whether they are proved, and every rung's record."""
+
+    columns: Columns
+    laid: Laid
+    proved: bool
+    rungs: tuple[Rung, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Exam:
+    gluing: Gluing
+    folded: SpaceFlaws
+    unfolded: SpaceFlaws
+
+    @classmethod
+    def of(cls, folded: Floats, unfolded: Floats, T: Ints) -> _Exam:
+        gluing = Gluing.of(T)
+        return cls(gluing, examine(folded, gluing), examine(unfolded, gluing))
+
+    @property
+    def passed(self) -> bool:
+        return self.gluing.sound and self.folded.none and self.unfolded.none
+
+    @property
+    def vertices(self) -> Ints:
+        """Vertices of the tetrahedra at fault."""
+        found = [self.gluing.misglued]
+        found += [f.elements(self.gluing) for f in (self.folded, self.unfolded)]
+        bad = self.gluing.T[np.concatenate(found)].ravel()
+        return bad if self.gluing.closed else np.concatenate([bad, self.gluing.pinched])
+
+    def rung(self, name: str, steps: int = 0) -> Rung:
+        return Rung(
+            name,
+            len(self.folded.inverted),
+            len(self.unfolded.inverted),
+            len(self.folded.crossing),
+            len(self.unfolded.crossing),
+            len(self.gluing.misglued) + (0 if self.gluing.closed else len(self.gluing.pinched)),
+            steps=steps,
+        )
+
+
+def climb(
+    rungs: Iterable[tuple[str, Callable[[], tuple[Columns, Layers]]]],
+    points: Floats,
+    shrinks: int,
+) -> Climbed:
+    """Return the first rung's prisms that are proved and hold every block.
+
+    The shell may hold some of them.  Where none does, those that are proved and lose the fewest
+    blocks; where none is proved, the fewest flaws are mended.
+
+    Parameters
+    ----------
+    rungs : iterable of (name, callable)
+        What to try, in order; each callable returns columns and offsets on them.  Of several by
+        one name each reaches farther than the one before: where that could not be proved or
+        mended, the next is not tried.
+    points : (n, 3) float
+        The blocks, working units.
+    shrinks : int
+        Most steps of shrinking around what is wrong, from the best of the rungs.
+    """
+    records: list[Rung] = []
+    held: list[tuple[int, int, int, Columns, Laid]] = []
+    flawed: list[tuple[int, int, Columns, Layers, _Exam]] = []
+    hopeless: set[str] = set()
+    for name, make in rungs:
+        if name in hopeless:
+            continue
+        columns, layers = make()
+        laid, exam = _proved(columns, layers)
+        records.append(exam.rung(name))
+        if laid is None:
+            flawed.append((records[-1].flaws, len(flawed), columns, layers, exam))
+            sound = [mesh.layers for _, _, _, other, mesh in held if other is columns]
+            near = sound[-1] if sound else columns.bare(layers)
+            columns, laid, rung = _blended(columns, layers, near, exam)
+            if laid is None and not held:
+                records.append(rung)
+                _, _, columns, layers, exam = flawed[-1]
+                laid, rung = _untangled(columns, layers, exam)
+            records.append(rung)
+        if laid is None:
+            hopeless.add(name)
+            continue
+        laid, outside, lost = _covering(laid, points)
+        records[-1] = replace(records[-1], outside=outside, lost=lost)
+        held.append((lost, outside, len(held), columns, laid))
+        if not lost:
+            break
+    if held:
+        columns, laid = min(held, key=lambda found: found[:3])[3:]
+        return Climbed(columns, laid, True, tuple(records))
+    _, _, columns, layers, exam = min(flawed, key=lambda found: found[:2])
+    return _shrunk(columns, layers, exam, records, points, shrinks)
+
+
+def _blended(
+    columns: Columns, layers: Layers, near: Layers, exam: _Exam
+) -> tuple[Columns, Laid | None, Rung]:
+    """Return prisms that reach no farther than near ones around what is wrong.
+
+    Columns there that hold no block are left out.  None where they are not proved.
+    """
+    mean, n = neighbour_mean(layers.F, len(layers.P)), len(layers.P)
+    back = np.zeros(n, dtype=bool)
+    low = np.minimum([near.up, near.down], [layers.up, layers.down])
+    laid, step = None, 0
+    while laid is None and step < _BLENDS:
+        step += 1
+        touched = np.unique(exam.vertices % n)
+        columns = columns.narrowed(touched)
+        back[touched] = True
+        back = np.asarray(mean @ back > 0) | back
+        wanted = np.where(back, low, [layers.up, layers.down])
+        slopes = [bounded_slope(q, columns.prints.U, layers.F, _BLEND) for q in wanted]
+        offsets, F = np.maximum(slopes, low), columns.prints.F
+        laid, exam = _proved(columns, replace(layers, F=F, up=offsets[0], down=offsets[1]))
+    return columns, laid, exam.rung("blended", step)
+
+
+def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:
+    """Return the prisms with what else it takes to hold a few points that they do not.
+
+    Tents are raised over points that the shell does not hold either, and tetrahedra of the shell
+    that hold points become the body's.  Where many points are outside, those in the shell are
+    left there.  With the prisms the number of points outside the body's tetrahedra, and of those
+    that nothing holds.
+    """
+    missed = points[TetIndex(laid.folded, laid.T).locate(points) < 0]
+    if not len(missed):
+        return laid, 0, 0
+    lost = missed[_in_shell(laid, missed) < 0]
+    if len(lost) <= _TENTS * len(points):
+        laid, left = with_tents(laid, lost)
+        lost = lost[left]
+    if len(missed) > _FEW * len(points):
+        return laid, len(missed), len(lost)
+    held = _in_shell(laid, missed)
+    return laid.taking_in(np.unique(held[held >= 0])), len(lost), len(lost)
+
+
+def _in_shell(laid: Laid, points: Floats) -> Ints:
+    """Return the shell's tetrahedron that holds each point (k, 3), -1 for none."""
+    if not len(laid.shell):
+        return np.full(len(points), -1)
+    return TetIndex(laid.folded, laid.shell).locate(points)
+
+
+def _untangled(columns: Columns, layers: Layers, exam: _Exam) -> tuple[Laid | None, Rung]:
+    """Return the prisms after moving as few vertices as it takes; None where it did not do."""
+    laid = columns.lay_out(columns.surround(layers)).without_shell()
+    bad = np.unique(exam.vertices)
+    if len(bad) > _MOVABLE * laid.inner:
+        return None, exam.rung("untangled")
+    folded = untangle(laid.folded, laid.T, laid.unfolded, bad)
+    unfolded = untangle(laid.unfolded, laid.T, folded, bad)
+    proved, exam = _proved(columns, layers, (folded, unfolded))
+    return proved, exam.rung("untangled", len(bad))
+
+
+def _shrunk(
+    columns: Columns,
+    layers: Layers,
+    exam: _Exam,
+    records: list[Rung],
+    points: Floats,
+    shrinks: int,
+) -> Climbed:
+    """Return prisms whose flaws are shrunk away; or, as they were, unproved."""
+    first, mean = layers, neighbour_mean(layers.F, len(layers.P))
+    for step in range(1, shrinks + 1):
+        layers = shrink(layers, np.unique(exam.vertices % len(layers.P)), mean)
+        laid, exam = _proved(columns, layers)
+        if laid is not None:
+            laid, outside, lost = _covering(laid, points)
+            records.append(replace(exam.rung("shrunk", step), outside=outside, lost=lost))
+            return Climbed(columns, laid, True, tuple(records))
+    records.append(exam.rung("shrunk", shrinks))
+    laid = columns.lay_out(columns.surround(first)).without_shell()
+    return Climbed(columns, laid, False, tuple(records))
+
+
+def _proved(
+    columns: Columns, layers: Layers, body: tuple[Floats, Floats] | None = None
+) -> tuple[Laid | None, _Exam]:
+    """Return the prisms with as much of their shell as can be proved; None where they cannot.
+
+    With them the examination of the body's tetrahedra, or of the whole where that passed.
+    """
+    around = columns.surround(layers)
+    laid = columns.lay_out(around, body)
+    whole = _Exam.of(laid.folded, laid.unfolded, laid.all_tets)
+    if whole.passed:
+        return laid, whole
+    inner = laid.without_shell()
+    alone = _Exam.of(inner.folded, inner.unfolded, inner.T)
+    if not alone.passed:
+        return None, alone
+    for _ in range(_TRIMS):
+        touched = np.zeros(len(around.whole.P), dtype=bool)
+        touched[laid.node[whole.vertices]] = True
+        around = less(around, touched)
+        if around.none:
+            break
+        laid = columns.lay_out(around, body)
+        whole = _Exam.of(laid.folded, laid.unfolded, laid.all_tets)
+        if whole.passed:
+            return laid, alone
+    return inner, alone

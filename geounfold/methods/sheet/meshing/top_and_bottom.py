@@ -1,0 +1,193 @@
+"""Top and bottom as heights over the flat mid surface, for the stratigraphic coordinate.
+
+They are fitted to the hull, and then, on a lattice, moved until they separate blocks from empty
+sites, as the sheet was (see `occupancy`).  What the sites leave open, on limbs along a lattice
+plane say, the hull settles, where it can: a sheet of a few blocks is no thicker than the hull is
+blurred, and there it is the sharpened half thickness that does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.methods.sheet.mid_surface.fit import (
+    RIDGE,
+    FittedSheet,
+    HullSamples,
+    unbiased_heights,
+)
+from geounfold.methods.sheet.mid_surface.normal_equations import Stencils
+from geounfold.methods.sheet.mid_surface.spline import SplineGrid, density_weights
+from geounfold.methods.sheet.mid_surface.surface import near_any
+from geounfold.methods.sheet.sharpening.by_lattice_sites import separating_step
+from geounfold.methods.sheet.sharpening.lattice_sites import Sites
+from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_places import Places
+
+
+@dataclass(frozen=True, kw_only=True)
+class HorizonOptions:
+    """How top and bottom are fitted; lengths in blocks.
+
+    ``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull normal
+    and the mid surface's, below which a sample is rim; ``erosion``: distance kept from the
+    rim, where hulls are rounded; ``misfit``: largest departure from the half thickness;
+    ``stiffness``: pull towards the half thickness where there are no samples; ``separate``:
+    smoothing length of what the sites add; ``margins``: softness of the separation, round by
+    round; ``blurred``: half thickness up to which the hull's heights are not used; from one
+    block more they are; ``thinnest``: half thickness below which sites are left alone.
+    """
+
+    smooth: float = 1.5
+    agree: float = 0.9
+    erosion: float = 0.5
+    misfit: float = 2.5
+    stiffness: float = 1e-4
+    separate: float = 1.5
+    margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
+    blurred: float = 2.0
+    thinnest: float = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Horizons:
+    """Heights of the hanging wall and the footwall over the flat mid surface.
+
+    Attributes
+    ----------
+    grid : SplineGrid
+        Basis in the unfolded parameters u = U - t slip(U).
+    top, bottom : (grid.size,) float
+        Coefficients of the signed heights of top and bottom.
+    """
+
+    grid: SplineGrid
+    top: Floats
+    bottom: Floats
+
+    def scaled(self, factor: float) -> Horizons:
+        """Return the horizons in another unit: lengths times a factor."""
+        return Horizons(self.grid.scaled(factor), self.top * factor, self.bottom * factor)
+
+    def heights(self, u: Floats) -> tuple[Floats, Floats]:
+        """Return the bottom's and the top's height at u (n, 2); at least 0.3 block apart."""
+        top, bottom = self.grid.value(self.top, u), self.grid.value(self.bottom, u)
+        return bottom, np.maximum(top, bottom + 0.3)
+
+    def crossings(self, U: Floats, slip: Floats, limit: float) -> tuple[Floats, Floats]:
+        """Return where normals of the mid surface at U (n, 2) meet bottom and top, (n,) each.
+
+        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by Newton's
+        method.  Past the blocks, where heights are continued, t stays within the limit.
+        """
+        found = []
+        for C in (self.bottom, self.top):
+            t = np.clip(self.grid.value(C, U), -limit, limit)
+            for _ in range(8):
+                height, hu, hv = self.grid.gradient(C, U - t[:, None] * slip)
+                rate = 1 + hu * slip[:, 0] + hv * slip[:, 1]
+                t = np.clip(t - (t - height) / np.maximum(rate, 0.3), -limit, limit)
+            found.append(t)
+        return found[0], np.maximum(found[1], found[0] + 0.3)
+
+
+def fit_horizons(
+    fitted: FittedSheet, samples: HullSamples, knots: float, options: HorizonOptions
+) -> Horizons:
+    """Return the height fields of top and bottom fitted to the hull (see Horizons)."""
+    sheet, grid = fitted.sheet, fitted.sheet.grid
+    foot = sheet.search().feet(samples.points)
+    cos = np.einsum("ij,ij->i", samples.normals, foot.normal)
+    side = np.sign(cos)
+    height = unbiased_heights(sheet, foot, side, samples)
+    flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
+    rim = near_any(samples.points, np.abs(cos) < options.agree, options.erosion)
+    nodes, _ = sheet.samples()
+    P = grid.basis(nodes)
+    sampled = grid.gram(P, np.ones(len(nodes)))
+    half = sampled.solver(RIDGE)(P.T @ np.maximum(grid.value(fitted.half, nodes), 0.2))
+    bending = (options.smooth / knots) ** 4 * grid.energy(2)
+    still = bending + options.stiffness * sampled
+    found = []
+    for s in (1.0, -1.0):
+        reach = fitted.reach(s, half)
+        expected = grid.value(reach, flat)
+        use = (foot.miss < 0.1) & (side == s) & ~rim
+        use &= np.abs(s * foot.t - expected) < options.misfit
+        B = grid.basis(flat[use])
+        w = density_weights(flat[use], knots) if use.any() else np.empty(0)
+        K = grid.gram(B, w) + still
+        rest = K.solver(ridge=1e-12)(B.T @ (w * (height[use] - s * expected[use])))
+        found.append(rest + s * reach)
+    return Horizons(grid, found[0], found[1])
+
+
+def separate_horizons(
+    fitted: FittedSheet,
+    hull: Horizons,
+    sites: Sites,
+    options: HorizonOptions,
+    occupancy: SiteOptions,
+) -> Horizons:
+    """Return the height fields of top and bottom that separate blocks from empty sites.
+
+    Each leaves its start as far as the sites on its own side ask for: the energy is that of
+    `sharpen`, with the second differences of what is added.
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Sharpened by the sites.
+    hull : Horizons
+        Fitted to the hull: the start, unless the sheet is thin.
+    sites : Sites
+        Lattice sites at the body's surface.
+    options : HorizonOptions
+        See there.
+    occupancy : OccupancyOptions
+        How sites are chosen.
+    """
+    grid = fitted.sheet.grid
+    nodes, _ = fitted.sheet.samples()
+    held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
+    still = (options.separate * fitted.unit / grid.step) ** 4 * grid.energy(
+        2
+    ) + options.stiffness * held
+    sharp = [fitted.reach(side, fitted.half) for side in (1.0, -1.0)]
+    trust = np.clip(fitted.half / fitted.unit - options.blurred, 0.0, 1.0)
+    start = (
+        sharp[0] + trust * (hull.top - sharp[0]),
+        sharp[1] + trust * (-hull.bottom - sharp[1]),
+    )
+    reach = start
+    occupancy = replace(occupancy, thinnest=options.thinnest)
+    places = Places.of(fitted, sites, occupancy)
+    places.follow(fitted.sheet, reach, fitted.slip, steps=1)
+    for margin in options.margins:
+        use = places.explained(margin, occupancy.depths[-1], occupancy)
+        above = places.side[use] > 0
+        rise = [
+            _rise(places, mine, grid, margin, still, now - first, fitted.unit <= 1)
+            for mine, now, first in zip((use[above], use[~above]), reach, start, strict=True)
+        ]
+        reach = (reach[0] + rise[0], reach[1] + rise[1])
+        places.level(grid, reach)
+    return Horizons(grid, reach[0], -reach[1])
+
+
+def _rise(
+    places: Places,
+    use: Ints,
+    grid: SplineGrid,
+    margin: float,
+    still: Stencils,
+    rest: Floats,
+    held: bool,
+) -> Floats:
+    """Return a Newton step of a horizon's reach, outwards, from some of the sites."""
+    H, occupied = grid.basis(places.flat[use]), places.sites.occupied[use]
+    height = places.beyond[use]
+    return separating_step(H, height, occupied, margin, grid.step, still, still @ rest, held)

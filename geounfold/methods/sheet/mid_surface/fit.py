@@ -1,0 +1,372 @@
+"""Fit the mid surface and the half thickness, growing from the core to the rim."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.errors import SplitError
+from geounfold.geometry.measures import unit
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.methods.sheet.mid_surface.medial_points import MedialSheet
+from geounfold.methods.sheet.mid_surface.normal_equations import Stencils, coupled_solver
+from geounfold.methods.sheet.mid_surface.spline import SplineGrid, density_weights
+from geounfold.methods.sheet.mid_surface.surface import (
+    Foot,
+    MidSurface,
+    blur_shift,
+    near_any,
+    slip_potential,
+)
+
+OWN = 0.75
+"""How far past the half thickness a foot is taken to be on the point's own limb, in blocks."""
+
+RIDGE = 1e-9
+"""Weight that holds coefficients which nothing else reaches."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """Resolution, smoothness and acceptance of the sheet fit; lengths in blocks.
+
+    ``knots``: spline knot spacing; ``cell``: spacing of the searched sampling; ``smooth``:
+    length below which the mid surface is smoothed, on smooth hulls and (times ``rough``)
+    on staircases, by residuals between ``quiet`` and ``loud``; ``smooth_half``: the same for
+    the half thickness, and ``order_half`` the order of its differences that are kept small: 2,
+    or 3 where it may taper all the way; ``weak``: weight of medial points off the core;
+    ``unseen``: weight of curvature, felt where no sample tells it, across a narrow strip;
+    ``rounds``: growth rounds; ``agree``: least cosine between a sample's normal and the
+    predicted one; ``first``/``later``: largest thickness misfit of an accepted sample in round
+    one and after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
+    accepted samples the sheet is searched; ``ahead``: samples whose feet lie farther than this
+    from the last round's accepted ones are left for later rounds.
+    """
+
+    knots: float = 3.5
+    cell: float = 1.5
+    smooth: float = 2.2
+    rough: float = 1.5
+    quiet: float = 0.03
+    loud: float = 0.08
+    smooth_half: float = 3.0
+    order_half: int = 2
+    weak: float = 1e-4
+    unseen: float = 3e-4
+    rounds: int = 4
+    agree: float = 0.93
+    first: float = 1.5
+    later: float = 1.0
+    erosion: float = 1.5
+    reach: float = 4.0
+    ahead: float = np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloserFitOptions(FitOptions):
+    """The same where the first fit does not hold: closer to the samples, grown step by step.
+
+    A hinge of few blocks' radius is flattened by the smoothing that evens out staircases.  The
+    sheet then runs straight on where the body bends, rejects what lies there, and keeps away
+    from it; so it never reaches the body's ends, which in overturned folds are long wedges.
+    """
+
+    smooth: float = 1.0
+    rough: float = 1.0
+    unseen: float = 1e-4
+    rounds: int = 8
+    later: float = 0.7
+    erosion: float = 0.75
+    ahead: float = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class HullSamples:
+    """Points of the hull with outward normals, and how the hull was made.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) float
+        Hull vertices, working units, and their unit outward normals.
+    side : (n,) int
+        The split's side of each: +1 top, -1 bottom, 0 undecided.
+    variance : (3,) float
+        Variance of the blur per axis.
+    inset : float
+        How far inside the body's surface the hull runs.
+    """
+
+    points: Floats
+    normals: Floats
+    side: Ints
+    variance: Floats
+    inset: float
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSheet:
+    """The fitted mid surface with its half thickness.
+
+    Attributes
+    ----------
+    sheet : Sheet
+        Mid surface; offsets are positive on the top's side.
+    half : (size,) float
+        Spline coefficients of the half thickness, in *unfolded* parameters.
+    slip : (size, 2) float
+        Spline coefficients of the slip potential: unfolded u = U - t slip(U).
+    near : (k, 2) float
+        Parameters of the accepted samples.
+    roughness : float
+        Weighted rms residual of the accepted samples, in blocks.
+    smoothing : float
+        Smoothing length used, in blocks.
+    accepted : float
+        Share of the samples accepted.
+    lean, level : float
+        Where the sheet was moved onto the surface that layers run parallel to (see conform):
+        side and median half thickness.
+    unit : float
+        Side of what it was fitted to, blocks or cells of merged blocks, in the unit of lengths.
+    """
+
+    sheet: MidSurface
+    half: Floats
+    slip: Floats
+    near: Floats
+    roughness: float
+    smoothing: float
+    accepted: float
+    lean: float = 0.0
+    level: float = 0.0
+    unit: float = 1.0
+
+    def scaled(self, factor: float) -> FittedSheet:
+        """Return the sheet in another unit: lengths times a factor."""
+        return replace(
+            self,
+            sheet=self.sheet.scaled(factor),
+            half=self.half * factor,
+            near=self.near * factor,
+            roughness=self.roughness * factor,
+            smoothing=self.smoothing * factor,
+            level=self.level * factor,
+            unit=self.unit * factor,
+        )
+
+    def own_feet(self, Q: Floats, reaches: tuple[float, ...]) -> Foot:
+        """Return the feet of points Q (n, 3) of the body on the limb that they belong to.
+
+        Where limbs come close, the nearest point of the sheet may lie where it was continued
+        past its rim into another limb.  So the least continued part of it that has a foot
+        within the half thickness is taken: parts within ``reaches`` (rising) of the samples
+        are tried in turn.  What none of them holds has the foot of the last one, or of the
+        whole sheet.
+        """
+        foot = self.sheet.search(self.near, reaches[0]).feet(Q)
+        for reach in (*reaches[1:], None):
+            half = self.sheet.grid.value(self.half, foot.U)
+            thick = np.where(foot.t >= 0, self.reach(1.0, half), self.reach(-1.0, half))
+            over = np.abs(foot.t) > thick + OWN
+            lost = foot.miss > 0.05
+            rows = np.flatnonzero(lost | over if reach is not None else lost)
+            if not len(rows):
+                break
+            search = self.sheet.search() if reach is None else self.sheet.search(self.near, reach)
+            again = search.feet(Q[rows], newton=2 if reach is not None else 3)
+            better = lost[rows] | ((again.miss <= 0.05) & (np.abs(again.t) < np.abs(foot.t[rows])))
+            for mine, theirs in zip(foot, again, strict=True):
+                mine[rows[better]] = theirs[better]
+        return foot
+
+    def left_out(self, points: Floats) -> float:
+        """Return how far the points (n, 3) of the body lie beyond its horizons, on average.
+
+        At most three blocks each, which also stand for a point without a foot.  About 0.001
+        blocks where the sheet holds the body, 0.1 and more where it lost a limb.
+        """
+        foot = self.own_feet(points, tuple(r * self.unit for r in (2.0, 5.0, 10.0)))
+        grid, most = self.sheet.grid, 3.0 * self.unit
+        flat = foot.U - foot.t[:, None] * grid.value(self.slip, foot.U)
+        over = np.clip(np.abs(foot.t) - grid.value(self.half, flat), 0.0, most)
+        return float(np.where(foot.miss > 0.1 * self.unit, most, over).mean())
+
+    def reach(self, side: float, half: Floats) -> Floats:
+        """Return the distance from the sheet to its top (side 1) or bottom (-1), (n,)."""
+        return half - side * self.lean * (half - self.level)
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """The grid's energies and weights that every solve of the fit shares."""
+
+    grid: SplineGrid
+    bending: Stencils
+    third: Stencils
+    even_half: Stencils
+    unseen: float
+
+    def stiffness(self, length: float) -> Stencils:
+        """Return the surface's energy: curvature continues, and is none where nothing says so."""
+        return (length / self.grid.step) ** 6 * self.third + self.unseen * self.bending
+
+
+def _start(
+    medial: MedialSheet, points: Floats, options: FitOptions
+) -> tuple[_System, MidSurface, Floats]:
+    """Return the spline system, the first sheet and the first half thickness."""
+    margin = float(np.max(cKDTree(medial.mesh.V).query(points)[0])) + 3
+    low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
+    grid = SplineGrid.over(low, high, options.knots)
+    bending = grid.energy(2)
+    even_half = (options.smooth_half / options.knots) ** (2 * options.order_half) * (
+        grid.energy(options.order_half)
+    )
+    if options.order_half > 2:  # steady slopes are free then, and unlimited past the samples
+        even_half = even_half + options.unseen * bending
+    system = _System(grid, bending, grid.energy(3), even_half, options.unseen)
+    w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
+    B = grid.basis(medial.uv)
+    BtWB = grid.gram(B, w)
+    C = (BtWB + system.stiffness(options.smooth)).solver(RIDGE)(B.T @ (w[:, None] * medial.mesh.V))
+    half = (BtWB + even_half).solver(RIDGE)(B.T @ (w * medial.half))
+    return system, MidSurface(grid, C, low, high, options.cell), half
+
+
+@dataclass(frozen=True, eq=False)
+class _Accepted:
+    """Samples accepted in one round of growth."""
+
+    foot: Foot
+    height: Floats  # offset with the hull's bias undone
+    side: Floats
+    flat: Floats  # unfolded parameters
+    keep: Bools
+
+
+def unbiased_heights(sheet: MidSurface, foot: Foot, side: Floats, samples: HullSamples) -> Floats:
+    """Return the samples' offsets with the hull's blur and inset undone, (n,)."""
+    shift = np.zeros(len(foot.t))
+    if samples.variance.any():
+        shift = np.clip(blur_shift(sheet.jet(foot.U), foot.t, samples.variance), -0.5, 0.5)
+    return foot.t - shift + side * samples.inset
+
+
+def _accept(
+    sheet: MidSurface,
+    half: Floats,
+    slip: Floats | None,
+    foot: Foot,
+    samples: HullSamples,
+    misfit: float,
+    near: Floats,
+    options: FitOptions,
+) -> _Accepted:
+    """Return which samples agree with the sheet so far, by normal and by thickness.
+
+    Those far from the parameters ``near`` (k, 2) say nothing yet, for or against.
+    The distance kept from those that do not is reduced where it would cost most of a strip.
+    """
+    side = np.sign(np.einsum("ij,ij->i", samples.normals, foot.normal))
+    height = unbiased_heights(sheet, foot, side, samples)
+    flat = foot.U if slip is None else foot.U - foot.t[:, None] * sheet.grid.value(slip, foot.U)
+    expected, hu, hv = sheet.grid.gradient(half, flat)
+    _, Pu, Pv = sheet.grid.gradient(sheet.C, foot.U)
+    predicted = unit(side[:, None] * foot.normal - hu[:, None] * Pu - hv[:, None] * Pv)
+    cos = np.einsum("ij,ij->i", samples.normals, predicted)
+    good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
+    good &= side * samples.side >= 0  # else the sheet has run into another limb
+    true_foot = foot.miss < 0.1
+    if np.isfinite(options.ahead):
+        true_foot &= cKDTree(near).query(foot.U)[0] < options.ahead
+    good &= true_foot
+    wrong = ~good & true_foot
+    for erosion in (options.erosion, options.erosion / 2, 0.0):
+        keep = good & ~near_any(samples.points, wrong, erosion)
+        if 2 * keep.sum() > good.sum():
+            break
+    return _Accepted(foot, height, side, flat, keep)
+
+
+def _side_weights(accepted: _Accepted, cell: float) -> Floats:
+    """Return weights that count every knot cell once per side."""
+    U, side = accepted.foot.U[accepted.keep], accepted.side[accepted.keep]
+    w = np.empty(len(U))
+    for s in (1.0, -1.0):
+        mine = side == s
+        if mine.any():
+            w[mine] = density_weights(U[mine], cell)
+    return w
+
+
+def _refit(
+    system: _System, sheet: MidSurface, accepted: _Accepted, smoothing: float, options: FitOptions
+) -> tuple[MidSurface, Floats, Floats, float, float]:
+    """Return sheet, half thickness, weights, roughness and smoothing of one round.
+
+    Offset and half thickness are solved together, t = delta(U) + side half(u); the mid
+    points move by what is left and the surface is fitted to them anew.
+    """
+    keep = accepted.keep
+    U, t, s = accepted.foot.U[keep], accepted.height[keep], accepted.side[keep]
+    w = _side_weights(accepted, options.knots)
+    B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
+    BtWB = system.grid.gram(B, w)
+    surface = BtWB + system.stiffness(smoothing)
+    thickness = system.grid.gram(H, w) + system.even_half
+    cross = B.T @ H.multiply((w * s)[:, None]).tocsr()
+    solve = coupled_solver(surface, thickness, cross, RIDGE)
+    z = solve(np.concatenate([B.T @ (w * t), H.T @ (w * s * t)]))
+    half = z[system.grid.size :]
+    mid = t - s * (H @ half)
+    residual = mid - B @ z[: system.grid.size]
+    roughness = float(np.sqrt((w * residual**2).sum() / w.sum()))
+    stretch = np.interp(roughness, [options.quiet, options.loud], [1.0, options.rough])
+    smoothing = options.smooth * float(stretch)
+    points = sheet.at(U) + mid[:, None] * accepted.foot.normal[keep]
+    C = (BtWB + system.stiffness(smoothing)).solver(RIDGE)(B.T @ (w[:, None] * points))
+    return sheet.with_coefficients(C), half, w, roughness, smoothing
+
+
+def fit_mid_surface(
+    medial: MedialSheet, samples: HullSamples, points: Floats, options: FitOptions
+) -> FittedSheet:
+    """Return the mid surface and half thickness fitted to a hull.
+
+    Parameters
+    ----------
+    medial : MedialSheet
+        First guess.
+    samples : Samples
+        The hull's vertices.
+    points : (n, 3) float
+        The blocks, which set how far the sheet must reach.
+    options : FitOptions
+        See there.
+
+    Raises
+    ------
+    SplitError
+        No sample agrees with the sheet.
+    """
+    system, sheet, half = _start(medial, points, options)
+    slip: Floats | None = None
+    near, smoothing = medial.uv, options.smooth
+    for turn in range(options.rounds):
+        foot = sheet.search(near, options.reach).feet(samples.points)
+        misfit = options.first if turn == 0 else options.later
+        accepted = _accept(sheet, half, slip, foot, samples, misfit, near, options)
+        if not accepted.keep.any():
+            raise SplitError(
+                "no part of the hull agrees with a smooth sheet; try another --hull, or smaller "
+                "blocks where the body is narrow"
+            )
+        sheet, half, w, roughness, smoothing = _refit(system, sheet, accepted, smoothing, options)
+        near = accepted.foot.U[accepted.keep]
+        slip = slip_potential(sheet, near, w, system.bending)
+    if slip is None:
+        raise ValueError("FitOptions.rounds must be at least 1")
+    share = float(accepted.keep.mean())
+    return FittedSheet(sheet, half, slip, near, roughness, smoothing, share)

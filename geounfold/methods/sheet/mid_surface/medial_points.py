@@ -1,0 +1,280 @@
+"""First guess of the mid surface: medial points below the top, laid flat for parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from geounfold.backends.igl import boundary_loops, face_components, pinched_vertices
+from geounfold.errors import NoSheetError, SplitError
+from geounfold.geometry.measures import (
+    bilateral_normals,
+    loop_turning,
+    triangle_areas,
+    unit,
+    vertex_normals,
+    vertex_sum,
+)
+from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.methods.sheet.mid_surface.normal_equations import graph_laplacian, spd_solver
+from geounfold.methods.sheet.mid_surface.surface import near_any
+from geounfold.surfaces.split.faces import THICKEST
+from geounfold.surfaces.split.result import SurfaceSplit
+
+
+@dataclass(frozen=True, kw_only=True)
+class MedialOptions:
+    """How the trusted core and the parameter domain are cut out of the hull's top.
+
+    Lengths in blocks.  ``parallel``: a core face and its opposite face, normals smoothed by
+    ``sweeps`` bilateral passes, must satisfy -N.N' > parallel; ``closing``: width closed in
+    that region; ``island``: least share of its largest part that another part of it has (the
+    tip of an oblique cut is parallel again, by chance); ``erosion``: distance kept from the rim;
+    ``domain``: the flattened domain
+    keeps any face farther than this many median thicknesses from the change of side;
+    ``fair``: least share of a side that the domain should have;
+    ``prefer``: share by which the bottom must be more complete to be flattened for the top.
+    """
+
+    parallel: float = 0.94
+    sweeps: int = 6
+    closing: float = 2.5
+    island: float = 0.05
+    erosion: float = 1.5
+    domain: float = 1.2
+    fair: float = 0.5
+    prefer: float = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class MedialSheet:
+    """Medial points with parameters.
+
+    Attributes
+    ----------
+    mesh : TriMesh
+        Medial points, (n, 3), joined as the top's faces are.
+    uv : (n, 2) float
+        Isometric parameters, turned towards the working axes.
+    half : (n,) float
+        Half thickness.
+    trusted : (n,) bool
+        True on the core, where the half thickness was measured.
+    core_faces : (m,) bool
+        For every hull face: in the core.
+    normals : (k, 3) float
+        Smoothed outward normals of the hull's vertices.
+    """
+
+    mesh: TriMesh
+    uv: Floats
+    half: Floats
+    trusted: Bools
+    core_faces: Bools
+    normals: Floats
+
+    def scaled(self, factor: float) -> MedialSheet:
+        """Return the medial points in another unit: lengths times a factor."""
+        mesh = self.mesh.with_vertices(self.mesh.V * factor)
+        return replace(self, mesh=mesh, uv=self.uv * factor, half=self.half * factor)
+
+
+def _check_open(mesh: TriMesh) -> None:
+    """Raise NoSheetError where a surface closes on itself, as a tube does.
+
+    A pierced sheet has several boundary loops too, but its outer one turns by about 2 pi; of a
+    surface closed around an axis every loop runs around it and turns by about nothing.
+    """
+    loops = boundary_loops(mesh.F)
+    if len(loops) == 1:
+        return
+    if loops and max(loop_turning(mesh.V, mesh.F, loop) for loop in loops) > np.pi:
+        return
+    what = "around an axis" if loops else "on all sides"
+    raise NoSheetError(
+        f"the layer closes on itself {what}, so it has no flat image without a cut; leave out a "
+        "row of blocks along a cut, or unfold its parts one by one"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Domain:
+    """Faces of one side, ``top`` or not, that are laid flat; ``share`` of the side's area."""
+
+    faces: Ints
+    top: bool
+    share: float
+
+
+def _regions(
+    split: SurfaceSplit, normals: Floats, centres: Floats, options: MedialOptions
+) -> tuple[Bools, Ints, bool]:
+    """Return the trusted core (m,), the faces that are laid flat, and whether they are the top's.
+
+    A strip has little left away from its rim: the distance kept from it is reduced until the
+    faces are a fair share of their side.
+    """
+    area = triangle_areas(split.mesh.V, split.mesh.F)
+    deep = _far_inside(split, centres, options.domain)
+    for erosion in (options.erosion, options.erosion / 2, 0.0):
+        core, away = _core(split, normals, centres, erosion, options)
+        domain = _domain(split, (away | deep) & ~split.beyond, area, options.prefer)
+        if domain is not None and domain.share > options.fair:
+            return core, domain.faces, domain.top
+    whole = _domain(split, ~split.beyond, area, options.prefer)
+    if domain is None or (whole is not None and whole.share > 2 * domain.share):
+        domain = whole
+    if domain is None:
+        raise SplitError("the split left no top away from the rim; try another --hull")
+    return core, domain.faces, domain.top
+
+
+def _core(
+    split: SurfaceSplit, normals: Floats, centres: Floats, erosion: float, options: MedialOptions
+) -> tuple[Bools, Bools]:
+    """Return the trusted core and the faces away from the rim, (m,) each."""
+    away = ~split.rim & ~near_any(centres, split.rim, erosion) if erosion else ~split.rim
+    seen = (split.opposite >= 0) & np.isfinite(split.thickness)
+    other = normals[np.where(seen, split.opposite, 0)]
+    cos = np.where(seen, -np.einsum("ij,ij->i", normals, other), 0.0)
+    closed = near_any(centres, away & (cos > options.parallel), options.closing)
+    core = away & closed & ~near_any(centres, ~closed, options.closing)
+    return _large_parts(core, split.adjacency, options.island), away
+
+
+def _large_parts(faces: Bools, adjacency: Ints, share: float) -> Bools:
+    """Return faces (m,) without the connected parts of less than a share of the largest's."""
+    n = len(faces)
+    row, column = np.repeat(np.arange(n), 3), adjacency.ravel()
+    links = faces[row] & (column >= 0) & faces[column]
+    graph = sp.coo_array((np.ones(links.sum()), (row[links], column[links])), (n, n))
+    part = connected_components(graph, directed=False)[1]
+    size = np.bincount(part, faces)
+    out: Bools = faces & (size >= share * size.max())[part]
+    return out
+
+
+def _harmonic_half(
+    split: SurfaceSplit, F: Ints, faces: Ints, core: Bools, n: int
+) -> tuple[Floats, Bools]:
+    """Return half the thickness per vertex, measured on the core, harmonic elsewhere."""
+    good = core[faces] & np.isfinite(split.thickness[faces])
+    value = np.where(good, split.thickness[faces] / 2, 0.0)
+    count = vertex_sum(good.astype(float), F, n)
+    trusted = count > 0
+    if not trusted.any():
+        raise SplitError(
+            "no part of the top has a parallel bottom opposite it; "
+            "the body may be no sheet: try --split normal or another --hull"
+        )
+    mean = vertex_sum(value, F, n) / np.maximum(count, 1)
+    L = graph_laplacian(F, n)
+    K = sp.diags_array(trusted.astype(float)) + 2.0 * L + 1e-9 * sp.eye_array(n)
+    return spd_solver(K)(mean), trusted
+
+
+def medial_sheet(
+    split: SurfaceSplit,
+    flatten: Callable[[TriMesh, Floats | None], Floats],
+    options: MedialOptions,
+) -> MedialSheet:
+    """Return medial points of a split hull, half a thickness below the top, and parameters.
+
+    Parameters
+    ----------
+    split : SurfaceSplit
+        Hull in working units.
+    flatten : callable
+        ``flatten(mesh, start)`` -> uv (n, 2), an isometric flattening; start may be None.
+    options : MedialOptions
+        See there.
+
+    Raises
+    ------
+    SplitError
+        No top face has a parallel bottom opposite it.
+    NoSheetError
+        The top closes on itself.
+    """
+    mesh = split.mesh
+    centres = mesh.V[mesh.F].mean(axis=1)
+    normals = bilateral_normals(mesh, split.adjacency, options.sweeps)
+    core, faces, outward = _regions(split, normals, centres, options)
+    part, old = mesh.submesh(faces)
+    half, trusted = _harmonic_half(split, part.F, faces, core, len(old))
+    smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
+    inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
+    medial = TriMesh(part.V - half[:, None] * inward, part.F if outward else part.F[:, ::-1])
+    _check_open(medial)
+    uv = flatten(medial, None)
+    area = triangle_areas(mesh.V, mesh.F)
+    at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
+    return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, core, at_vertices)
+
+
+def _domain(split: SurfaceSplit, inside: Bools, area: Floats, prefer: float) -> _Domain | None:
+    """Return the faces inside that are laid flat; None where there are none.
+
+    The top's, unless its largest part leaves out more of it than the bottom's does by some
+    share: at the inside of a tight hinge there is little to see of a side.
+    """
+    found = []
+    for side in (1, -1):
+        mine = split.side == side
+        if (mine & inside).any():
+            faces = _one_sheet(split.mesh.F, np.flatnonzero(mine & inside))
+            share = float(area[faces].sum() / area[mine & ~split.beyond].sum())
+            found.append(_Domain(faces, side > 0, share))
+    if len(found) == 2 and found[1].share > found[0].share + prefer:
+        return found[1]
+    return found[0] if found else None
+
+
+def _one_sheet(F: Ints, faces: Ints) -> Ints:
+    """Return the largest part of some faces that is a manifold surface.
+
+    Faces around a vertex where two fans meet are left out.
+    """
+    while len(faces):
+        component = face_components(F[faces])
+        faces = faces[component == np.bincount(component).argmax()]
+        pinched = pinched_vertices(F[faces])
+        if not len(pinched):
+            return faces
+        faces = faces[~np.isin(F[faces], pinched).any(axis=1)]
+    raise SplitError("the top is no surface: every part of it is pinched; try another --hull")
+
+
+def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
+    """Return the faces farther than some median thicknesses from the change of side.
+
+    Not those whose ray missed the other side: ends of limbs that meet look along them.
+    """
+    near = np.where(split.adjacency >= 0, split.adjacency, np.arange(len(centres))[:, None])
+    change = (split.side[near] != split.side[:, None]).any(axis=1)
+    if not change.any():
+        return np.ones(len(centres), dtype=bool)
+    distance = cKDTree(centres[change]).query(centres)[0]
+    near_side = split.thickness <= THICKEST * split.median_thickness
+    return np.asarray(near_side & (distance > domain * split.median_thickness))
+
+
+def _oriented(uv: Floats, V: Floats) -> Floats:
+    """Return parameters centred and turned, never mirrored, towards the working axes.
+
+    Of the isometry of the plane nearest to the map uv -> V, the first working axis (the
+    body's longest) has no component along the second parameter, and a positive one along the
+    first: flat x runs where the folded body's first axis does.
+    """
+    centred = uv - uv.mean(axis=0)
+    left, _, right = np.linalg.svd((V - V.mean(axis=0)).T @ centred, full_matrices=False)
+    x = (left @ right)[0]
+    length = float(np.linalg.norm(x))
+    cos, sin = x / length if length > 1e-6 else np.array([1.0, 0.0])
+    out: Floats = centred @ np.array([[cos, -sin], [sin, cos]])
+    return out

@@ -1,0 +1,103 @@
+"""Which surface the layers run parallel to: the mid surface, the top or the bottom.
+
+Where thickness varies on both sides alike, layers follow the mid surface.  Where it varies on
+one side only, a bulge or a scour, they follow the other side.  Of the three surfaces the layers'
+own was flat once, and flattens with the least strain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geounfold.geometry.measures import lengths, unique_edges
+from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.methods.sheet.mid_surface.fit import FittedSheet
+from geounfold.methods.sheet.mid_surface.medial_points import MedialSheet
+from geounfold.methods.sheet.mid_surface.spline import density_weights
+from geounfold.methods.sheet.mid_surface.surface import MidSurface, normals, slip_potential
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConformOptions:
+    """When another surface than the mid one is taken for the layers'.
+
+    ``varied``: least relative standard deviation of the half thickness; ``strained``: least
+    strain (rms over edges) of the flattened mid surface; ``share``: the other surface's strain
+    must be below this share of it.
+    """
+
+    varied: float = 0.03
+    strained: float = 0.002
+    share: float = 0.5
+
+
+def conform(
+    fitted: FittedSheet,
+    medial: MedialSheet,
+    flatten: Callable[[TriMesh, Floats], Floats],
+    options: ConformOptions,
+) -> FittedSheet:
+    """Return the sheet moved onto the surface that the layers run parallel to.
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        With the mid surface as its sheet.
+    medial : MedialSheet
+        Gives the domain that is flattened.
+    flatten : callable
+        ``flatten(mesh, start)`` -> uv (n, 2).
+    options : ConformOptions
+        See there.
+
+    Returns
+    -------
+    FittedSheet
+        ``lean`` is 0 where the mid surface stays, 1 for the top's shape, -1 for the bottom's.
+    """
+    half = fitted.sheet.grid.value(fitted.half, fitted.near)
+    level = float(np.median(half))
+    if level <= 0 or float(np.std(half)) < options.varied * level:
+        return fitted
+    limits = (float(half.min()), float(half.max()))
+
+    def strain(lean: float) -> float:
+        V = _leaning(fitted, medial.uv, lean, level, limits)
+        uv = flatten(TriMesh(V, medial.mesh.F), medial.uv)
+        E = unique_edges(medial.mesh.F)
+        return float(np.sqrt(np.mean((lengths(uv, E) / lengths(V, E) - 1) ** 2)))
+
+    middle = strain(0.0)
+    if middle < options.strained:
+        return fitted
+    best, lean = min((strain(side), side) for side in (1.0, -1.0))
+    if best > options.share * middle:
+        return fitted
+    return _moved(fitted, lean, level, limits)
+
+
+def _leaning(
+    fitted: FittedSheet, U: Floats, lean: float, level: float, limits: tuple[float, float]
+) -> Floats:
+    """Return points of the sheet moved towards a side by what it is thicker there, (n, 3)."""
+    jet = fitted.sheet.jet(U)
+    half = np.clip(fitted.sheet.grid.value(fitted.half, U), *limits)
+    return jet.value + (lean * (half - level))[:, None] * normals(jet)
+
+
+def _moved(
+    fitted: FittedSheet, lean: float, level: float, limits: tuple[float, float]
+) -> FittedSheet:
+    """Return the fit with its sheet moved, and its slip anew."""
+    sheet, grid = fitted.sheet, fitted.sheet.grid
+    U, _ = sheet.samples()
+    B = grid.basis(U)
+    K = grid.gram(B, np.ones(len(U))) + 1e-6 * grid.energy(2)
+    C = K.solver(ridge=1e-9)(B.T @ _leaning(fitted, U, lean, level, limits))
+    moved: MidSurface = sheet.with_coefficients(C)
+    weights = density_weights(fitted.near, grid.step)
+    slip = slip_potential(moved, fitted.near, weights, grid.energy(2))
+    return replace(fitted, sheet=moved, slip=slip, lean=lean, level=level)

@@ -1,0 +1,1 @@
+"""Sharpening: the mid surface corrected by the blocks themselves."""

@@ -1,0 +1,227 @@
+"""Sharpen a fitted sheet by what each lattice site says: the surface is above me, or below me.
+
+A blurred hull averages a staircase; where a horizon runs nearly along a lattice plane the average
+errs by a fixed part of a block.  The sites themselves are exact: a block's centroid lies inside
+the body, its empty neighbour's outside.  So top and bottom are the smoothest pair of surfaces
+that separate the two, found as in logistic classification with a margin that shrinks from 0.3
+block to 0.02.  In a sheet of one or two blocks a block is near both surfaces, and speaks for both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+from scipy.special import expit
+
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.methods.sheet.mid_surface.fit import RIDGE, FittedSheet
+from geounfold.methods.sheet.mid_surface.normal_equations import Stencils, gram
+from geounfold.methods.sheet.mid_surface.spline import density_weights
+from geounfold.methods.sheet.mid_surface.surface import MidSurface, slip_potential
+from geounfold.methods.sheet.sharpening.displace import displacement_basis, node_normals
+from geounfold.methods.sheet.sharpening.lattice_sites import Sites, scatter
+from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_places import Places
+
+_HOPELESS = 0.03  # blocks: mean depth on the wrong side that cells of merged blocks never mend
+
+
+_LEAST_SHARE = 0.1  # of the sites far from the rim that is kept
+
+
+_THICK = 1.2  # times the half thickness of a thin sheet, from which it is surely none
+
+
+@dataclass(frozen=True, eq=False)
+class _Views:
+    """The used sites as seen from the sheet.
+
+    A site lies ``height - A z - H half`` above its own horizon, z the surface's normal
+    displacement and half the half thickness, both as spline coefficients.
+    """
+
+    height: Floats
+    occupied: Bools
+    A: sp.csr_array
+    H: sp.csr_array
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """A sheet moved to separate the sites, or None where no smooth one does.
+
+    ``depth``: mean depth of the used sites on the wrong side, blocks; inf where none was used.
+    """
+
+    sheet: FittedSheet | None
+    depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """What one round made: sheet, half thickness, and how many sites are on the wrong side."""
+
+    sheet: MidSurface
+    half: Floats
+    wrong: float
+    depth: float
+
+
+def sharpen(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Separation:
+    """Return the sheet sharpened by lattice sites.
+
+    It is none where no smooth pair of surfaces separates the sites: their mean depth on the
+    wrong side is above ``misfit``.
+
+    Parameters
+    ----------
+    fitted : FittedSheet
+        Fit to the hull.
+    sites : Sites
+        Lattice sites at the body's surface.
+    options : OccupancyOptions
+        See there.
+    """
+    fitted, options = _for_thin(fitted, options.for_cells(fitted.unit))
+    sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
+    places = Places.of(fitted, sites, options)
+    rough, fine = grid.energy(4), grid.energy(3)
+    smooth, last = options.smooth, None
+    used = fitted.near
+    for k, margin in enumerate(options.margins):
+        depth = options.depths[min(k, len(options.depths) - 1)]
+        places.follow(sheet, (half, half), fitted.slip, steps=1 if k else 0)
+        use = places.explained(margin, depth, options)
+        if not len(use):
+            return Separation(None, np.inf)
+        nodes = node_normals(sheet)
+        views = _views(sheet, nodes, places, use)
+        last = _step(
+            sheet,
+            half,
+            nodes,
+            views,
+            margin,
+            smooth,
+            options.smooth_half,
+            rough,
+            fine,
+            options.held,
+        )
+        sheet, half, used = last.sheet, last.half, places.U[use]
+        if not np.isfinite(sheet.C).all():
+            return Separation(None, np.inf)
+        if k and not options.held and last.depth > _HOPELESS:
+            return Separation(None, last.depth)
+        places.watch(margin, options)
+        if margin <= options.adapt and last.wrong > options.tolerated:
+            smooth = max(smooth / options.pace, options.least)
+    if last is None or last.depth > options.misfit:
+        return Separation(None, np.inf if last is None else last.depth)
+    weights = density_weights(used, grid.step)
+    slip = slip_potential(sheet, used, weights, grid.energy(2))
+    sharper = replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
+    return Separation(sharper, last.depth)
+
+
+def enough_sites(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Sites:
+    """Return as many sites as a sheet fitted to cells of merged blocks can learn from.
+
+    Those near the rim and where the layer is thin all stay, as they tell each other's kind; of the
+    others an even part.
+    """
+    most = options.enough * fitted.sheet.grid.size
+    if fitted.unit <= 1 or len(sites.points) <= most:
+        return sites
+    grid, rim = fitted.sheet.grid, 2 * (options.rim + fitted.unit)
+    foot = fitted.sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
+    flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
+    half, seen = grid.value(fitted.half, flat), foot.miss < 0.02
+    inside = seen & (half - np.abs(foot.t) > np.minimum(options.depths[0], 0.6 * half))
+    holes = cKDTree(flat[inside & ~sites.occupied])
+    spare = seen & (half > _THICK * options.thin)
+    spare[spare] = holes.query(flat[spare], distance_upper_bound=rim)[0] > rim
+    share = (most - (~spare).sum()) / max(int(spare.sum()), 1)
+    kept = ~spare | (scatter(sites.points) < max(share, _LEAST_SHARE))
+    return Sites(sites.points[kept], sites.occupied[kept])
+
+
+def _for_thin(fitted: FittedSheet, options: SiteOptions) -> tuple[FittedSheet, SiteOptions]:
+    """Return fit and options so that sites of a thin sheet are listened to everywhere.
+
+    The hull of a thin sheet ends in a wide rim, over which the half thickness was continued;
+    where it came to nothing it is raised to half its median.  A thick sheet's own thin parts,
+    where it pinches out, are left to its rim.
+    """
+    least = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near))) / 2
+    options = replace(options, thinnest=min(options.thinnest, least))
+    if 2 * least > options.thin:
+        return fitted, replace(options, thin=0.0)
+    return replace(fitted, half=np.maximum(fitted.half, 1.01 * least)), options
+
+
+def _views(sheet: MidSurface, nodes: Floats, places: Places, use: Ints) -> _Views:
+    t, side = places.t[use], places.side[use]
+    A = displacement_basis(sheet, nodes, places.U[use], places.normal[use] * side[:, None])
+    H = sheet.grid.basis(places.flat[use])
+    return _Views(side * t, places.sites.occupied[use], A, H)
+
+
+def _step(
+    sheet: MidSurface,
+    half: Floats,
+    nodes: Floats,
+    views: _Views,
+    margin: float,
+    smooth: float,
+    smooth_half: float,
+    rough: Stencils,
+    fine: Stencils,
+    held: bool,
+) -> _Round:
+    """Take one Newton step in the surface, then one in the half thickness.
+
+    The energy is ``sum margin log(1 + exp(+-m / margin)) / knots^2`` over the sites, m their
+    height above their horizon (+ for blocks, - for empty sites), plus the fourth differences
+    of the moved surface (weight (smooth / knots)^8) and the third of the half thickness.
+    """
+    knots = sheet.grid.step
+    stiff = (smooth / knots) ** 8
+    pull = np.einsum("ij,ij->i", nodes, rough @ sheet.C)
+    m = views.height - views.H @ half
+    stiffness = stiff * rough.between(nodes)
+    z = separating_step(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull, held)
+    m = m - views.A @ z
+    even = (smooth_half / knots) ** 6 * fine
+    dh = separating_step(views.H, m, views.occupied, margin, knots, even, even @ half, held)
+    m = m - views.H @ dh
+    wrong = np.where(views.occupied, m, -m)
+    moved = sheet.with_coefficients(sheet.C + nodes * z[:, None])
+    depth = float(np.maximum(wrong, 0).mean())
+    return _Round(moved, half + dh, float((wrong > 0).mean()), depth)
+
+
+def separating_step(
+    A: sp.csr_array,
+    m: Floats,
+    occupied: Bools,
+    margin: float,
+    knots: float,
+    stiffness: Stencils,
+    pull: Floats,
+    held: bool,
+) -> Floats:
+    """Return a Newton step x for ``m - A x`` that moves no site by more than ten margins.
+
+    ``held``: nor any coefficient, past the rim or not.
+    """
+    slope = (expit(m / margin) - ~occupied) / knots**2
+    bend = 0.25 / np.cosh(np.clip(m / (2 * margin), -20, 20)) ** 2
+    weight = np.maximum(bend, 1e-4) / (margin * knots**2)
+    K = gram(A, weight, stiffness.shape) + stiffness
+    x = K.solver(RIDGE)(A.T @ slope - pull)
+    longest = float(np.abs(x if held else A @ x).max())
+    return x * min(1.0, 10 * margin / longest) if longest > 0 else x

@@ -1,0 +1,46 @@
+"""Moving a spline surface along its normals: bases, energies, feet that follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from geounfold.geometry.measures import unit
+from geounfold.geometry.mesh import Floats
+from geounfold.methods.sheet.mid_surface.surface import Foot, MidSurface, newton_step, normals
+
+
+def node_normals(sheet: MidSurface) -> Floats:
+    """Return the sheet's unit normals at its coefficients, inside the spline's range."""
+    grid = sheet.grid
+    ij = np.stack(np.unravel_index(np.arange(grid.size), grid.shape), axis=1)
+    ij = np.clip(ij, 1, np.array(grid.shape) - 2)
+    return normals(sheet.jet(grid.origin + grid.step * ij))
+
+
+def displacement_basis(sheet: MidSurface, nodes: Floats, U: Floats, normal: Floats) -> sp.csr_array:
+    """Return the matrix (n, size) from displacements of the coefficients to heights at U.
+
+    Coefficients move along ``nodes`` (size, 3), their own normals; the height is measured
+    along ``normal`` (n, 3), the surface's at U (n, 2).
+    """
+    A = sheet.grid.basis(U)
+    columns = A.indices.reshape(-1, 16)
+    along = np.zeros(columns.shape)
+    for axis in range(3):
+        along += nodes[:, axis].take(columns) * normal[:, axis, None]
+    A.data *= along.ravel()
+    return A
+
+
+def follow_feet(sheet: MidSurface, Q: Floats, U: Floats, steps: int) -> Foot:
+    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps alone.
+
+    Feet stay within the sheet's rectangle; a point without a foot there keeps a large miss.
+    """
+    for _ in range(steps):
+        U = np.clip(U + newton_step(sheet, Q, sheet.jet(U)), sheet.low, sheet.high)
+    P, Pu, Pv = sheet.grid.gradient(sheet.C, U)
+    normal = unit(np.cross(Pu, Pv))
+    t = np.einsum("ij,ij->i", Q - P, normal)
+    return Foot(U, t, normal, np.linalg.norm(Q - P - t[:, None] * normal, axis=1))

@@ -1,0 +1,140 @@
+"""Places of lattice sites on the mid surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.methods.sheet.mid_surface.fit import FittedSheet
+from geounfold.methods.sheet.mid_surface.spline import SplineGrid
+from geounfold.methods.sheet.mid_surface.surface import MidSurface
+from geounfold.methods.sheet.sharpening.displace import follow_feet
+from geounfold.methods.sheet.sharpening.lattice_sites import Sites
+from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+
+
+def clearance(margin: float) -> float:
+    """Return how far on its own side of a horizon a site still says something."""
+    return max(0.15, 6 * margin)
+
+
+@dataclass(eq=False)
+class Places:
+    """Where the sites lie in the sheet's coordinates; those watched are followed as it moves.
+
+    ``farther`` (n,): seen from the farther horizon, not the nearer; ``U`` (n, 2) feet, ``t``
+    (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded parameters, ``slope`` (n,) slip per
+    height; ``half`` (n,) half thickness, ``taper`` (n,) its slope and ``middle`` (n,) offset
+    half-way between the horizons there; ``watched`` (w,) rows.
+    """
+
+    sites: Sites
+    farther: Bools
+    U: Floats
+    t: Floats
+    normal: Floats
+    flat: Floats
+    half: Floats
+    taper: Floats
+    middle: Floats
+    watched: Ints
+    slope: Floats
+
+    @classmethod
+    def of(cls, fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Places:
+        """Return the sites with a foot on a sheet, the rest to be found by `follow`.
+
+        Blocks near both horizons are there twice.
+        """
+        sheet = fitted.sheet
+        foot = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
+        seen = foot.miss < 0.02
+        across = np.abs(foot.t) + sheet.grid.value(fitted.half, foot.U)
+        twice = across < clearance(options.margins[0]) + options.slack
+        rows = np.concatenate([np.flatnonzero(seen), np.flatnonzero(seen & twice & sites.occupied)])
+        n = len(rows)
+        farther = np.arange(n) >= int(seen.sum())
+        t, half, taper, middle = (np.empty(n) for _ in range(4))
+        normal, flat, U = np.empty((n, 3)), np.empty((n, 2)), foot.U[rows]
+        chosen = Sites(sites.points[rows], sites.occupied[rows])
+        watched, slope = np.arange(n), np.zeros(n)
+        return cls(chosen, farther, U, t, normal, flat, half, taper, middle, watched, slope)
+
+    @property
+    def side(self) -> Floats:
+        """The horizon each is seen from: +1 the top, -1 the bottom, (n,)."""
+        return np.where((self.t < self.middle) == self.farther, 1.0, -1.0)
+
+    @property
+    def beyond(self) -> Floats:
+        """Height over the horizon, (n,): away from the middle of the layer is up."""
+        return self.side * (self.t - self.middle) - self.half
+
+    @property
+    def right(self) -> Floats:
+        """Distance from the horizon on the side where the site belongs, (n,)."""
+        beyond = self.beyond
+        return np.where(self.sites.occupied, -beyond, beyond)
+
+    def follow(
+        self, sheet: MidSurface, reach: tuple[Floats, Floats], slip: Floats, steps: int
+    ) -> None:
+        """Find the watched sites' places anew; ``reach``: coefficients up to top and bottom."""
+        rows, grid = self.watched, sheet.grid
+        foot = follow_feet(sheet, self.sites.points[rows], self.U[rows], steps)
+        shear = grid.value(slip, foot.U)
+        flat = foot.U - foot.t[:, None] * shear
+        self.slope[rows] = np.linalg.norm(shear, axis=1)
+        self.U[rows], self.t[rows], self.normal[rows] = foot.U, foot.t, foot.normal
+        self.flat[rows] = flat
+        self.level(sheet.grid, reach)
+
+    def level(self, grid: SplineGrid, reach: tuple[Floats, Floats]) -> None:
+        """Find the horizons' heights at the watched sites' places anew."""
+        rows, (top, bottom) = self.watched, reach
+        half, hu, hv = grid.gradient((top + bottom) / 2, self.flat[rows])
+        self.half[rows], self.taper[rows] = half, np.hypot(hu, hv)
+        self.middle[rows] = (
+            0.0 if top is bottom else grid.value((top - bottom) / 2, self.flat[rows])
+        )
+
+    def watch(self, margin: float, options: SiteOptions) -> None:
+        """Watch only sites that may be used, or mark the rim, with this margin or a smaller one."""
+        near = self.right[self.watched] < clearance(margin) + options.slack
+        self.watched = self.watched[near]
+
+    def explained(self, margin: float, depth: float, options: SiteOptions) -> Ints:
+        """Return the sites that a horizon explains, not the rim (indices).
+
+        An empty site well inside the layer lies beyond the rim, and so do those around it; where
+        the layer tapers steeply, horizon and rim are one.
+        """
+        beyond, thickness = self.beyond, self.half
+        hole = self.holes(depth, options)
+        good = (self.right < clearance(margin)) & (np.abs(beyond) < max(options.band, 4 * margin))
+        good &= (thickness > options.thinnest) & (self.taper < options.taper)
+        use = np.flatnonzero(good)
+        wide = options.rim * np.hypot(1.0, options.sheared * self.slope[use])
+        most = float(wide.max(initial=options.rim))
+        rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=most)[0]
+        out: Ints = use[rim > wide]
+        return out
+
+    def holes(self, depth: float, options: SiteOptions) -> Bools:
+        """Return which empty sites lie well inside the layer, (n,): past its rim."""
+        deep = -self.beyond > np.minimum(depth, 0.6 * self.half)
+        deep &= ~self.sites.occupied & (self.half > options.thin)
+        return deep | self._uncovered(options)
+
+    def _uncovered(self, options: SiteOptions) -> Bools:
+        """Return which empty sites lie in a thin layer where no block is near, (n,)."""
+        beyond, occupied = self.beyond, self.sites.occupied
+        out: Bools = ~occupied & (beyond < 0) & (self.half <= options.thin)
+        if out.any():
+            blocks = self.flat[occupied & (beyond < 0.5)]
+            near = cKDTree(blocks).query(self.flat[out], distance_upper_bound=options.cover)[0]
+            out[out] = near > options.cover
+        return out

@@ -1,0 +1,298 @@
+"""Distortion of every block, and the quality of a whole unfolding."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from geounfold.errors import InputError
+from geounfold.geometry.measures import tet_volumes
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.mapping.control_mesh import ControlMesh
+from geounfold.mapping.distortion import deformation_gradients, distortion, edge_change
+from geounfold.quality.neighbour_distances import (
+    CACHED,
+    NEIGHBOURS,
+    epsilon,
+    lattice_epsilon,
+    neighbours,
+)
+from geounfold.quality.statistics import Statistics
+from geounfold.quality.truth import distance_ratios
+
+_SIDES = 6  # neighbours that share a face with a block of a lattice
+
+
+_PLANE = 1e-9  # of the largest variance: less than this across a plane is none
+
+
+@dataclass(frozen=True, eq=False)
+class BlockQuality:
+    """Distortion at each block, (n,) each: the columns of the unfolded table.
+
+    Attributes
+    ----------
+    volume_ratio, stretch_min, stretch_max, shear : (n,) float
+        Of the tetrahedron or prism that carried the block, there (see Distortion).
+    nmd_error : (n,) float
+        epsilon(X, Y) of the block (see `epsilon`).
+    """
+
+    volume_ratio: Floats
+    nmd_error: Floats
+    stretch_min: Floats
+    stretch_max: Floats
+    shear: Floats
+
+    def columns(self) -> dict[str, Floats]:
+        """Return the columns by name, in the order in which tables have them."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def block_quality(
+    control: ControlMesh,
+    elements: Ints,
+    folded: Floats,
+    unfolded: Floats,
+    k: int = NEIGHBOURS,
+    gradients: Floats | None = None,
+    lattice: tuple[Ints, Floats] | None = None,
+) -> BlockQuality:
+    """Return the distortion at each block.
+
+    Parameters
+    ----------
+    control : ControlMesh
+        The map.
+    elements : (n,) int
+        The tetrahedron that carried each block; -1 for a block without an image, whose figures
+        are NaN and which is no other block's neighbour.
+    folded, unfolded : (n, 3) float
+        The blocks in both spaces, in the same unit.
+    k : int
+        Number of neighbours of epsilon.
+    gradients : (p, 3, 3) float, optional
+        Deformation gradients at the p blocks that have an image; by default their tetrahedra's.
+    lattice : ((n, 3) int, (3,) float), optional
+        Lattice cell of each block, and the cells' sides: see `lattice_epsilon`.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not agree, or a row of `elements` that names no tetrahedron.
+    ControlMeshError
+        A tetrahedron that carries blocks has no volume, or no thickness when unfolded.
+    """
+    rows = np.asarray(elements)
+    count = len(control.folded.T)
+    if rows.shape != (len(folded),):
+        raise InputError(f"elements must have shape ({len(folded)},), but have {rows.shape}")
+    if rows.size and not -1 <= rows.min() <= rows.max() < count:
+        raise InputError(
+            f"elements name {rows.min()}..{rows.max()}, but there are {count} tetrahedra"
+        )
+    placed = rows >= 0
+    some = slice(None) if placed.all() else placed
+    X, Y = folded[some], unfolded[some]
+    error = (
+        epsilon(X, Y, k)
+        if lattice is None
+        else lattice_epsilon(X, Y, lattice[0][some], lattice[1], k)
+    )
+    if gradients is None:
+        used = np.flatnonzero(np.bincount(rows[some], minlength=count))
+        number = np.zeros(count, dtype=np.int64)
+        number[used] = np.arange(len(used))
+        back = number[rows[some]]
+        d = distortion(deformation_gradients(control, used))
+    else:
+        d, back = distortion(gradients), np.arange(len(gradients))
+
+    def spread(values: Floats) -> Floats:
+        out = np.full(len(rows), np.nan)
+        out[some] = values
+        return out
+
+    return BlockQuality(
+        volume_ratio=spread(d.volume_ratio[back]),
+        nmd_error=spread(error),
+        stretch_min=spread(d.stretch_min[back]),
+        stretch_max=spread(d.stretch_max[back]),
+        shear=spread(d.shear[back]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """How good an unfolding is, without a truth.
+
+    Attributes
+    ----------
+    blocks : BlockQuality
+        Distortion at each block.
+    nmd : Statistics
+        epsilon(X, Y) over the blocks; doing nothing scores 0.
+    shear : Statistics
+        Layer-parallel shear over the blocks.
+    volume_change : Statistics
+        |volume_ratio - 1| over the blocks.
+    edge_change : Statistics
+        |relative change of length| over the control mesh's edges.
+    volume_folded, volume_unfolded : float
+        Signed volume of the control mesh in both spaces.
+    inverted_folded, inverted_unfolded : int
+        Tetrahedra whose volume is not positive; for a map without a control mesh, blocks whose
+        neighbours' images are turned inside out.
+    """
+
+    blocks: BlockQuality
+    nmd: Statistics
+    shear: Statistics
+    volume_change: Statistics
+    edge_change: Statistics
+    volume_folded: float
+    volume_unfolded: float
+    inverted_folded: int
+    inverted_unfolded: int
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures as plain dicts and numbers, without the blocks' columns.
+
+        ``nmd`` also tells over how many blocks it is taken (``sample``): all that have an image,
+        so that its mean has no ``standard_error`` of sampling.
+        """
+        out = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "blocks"}
+        plain = {k: asdict(v) if isinstance(v, Statistics) else v for k, v in out.items()}
+        plain["nmd"] |= {
+            "sample": int(np.isfinite(self.blocks.nmd_error).sum()),
+            "standard_error": 0.0,
+        }
+        return plain
+
+
+def assess(
+    control: ControlMesh,
+    whole: ControlMesh,
+    elements: Ints,
+    folded: Floats,
+    unfolded: Floats,
+    k: int = NEIGHBOURS,
+    gradients: Floats | None = None,
+    lattice: tuple[Ints, Floats] | None = None,
+) -> Quality:
+    """Return the quality of an unfolding, over the blocks that have an image.
+
+    Parameters
+    ----------
+    control : ControlMesh
+        The body's tetrahedra.
+    whole : ControlMesh
+        Those and the shell around them, which ``elements`` name.
+    elements, folded, unfolded, k, gradients, lattice
+        As for `block_quality`, errors too.
+    """
+    blocks = block_quality(whole, elements, folded, unfolded, k, gradients, lattice)
+    placed = np.asarray(elements) >= 0
+    before = tet_volumes(control.folded.V, control.folded.T)
+    after = tet_volumes(control.unfolded.V, control.unfolded.T)
+    return Quality(
+        blocks=blocks,
+        nmd=Statistics.of(blocks.nmd_error[placed]),
+        shear=Statistics.of(blocks.shear[placed]),
+        volume_change=Statistics.of(np.abs(blocks.volume_ratio[placed] - 1)),
+        edge_change=Statistics.of(np.abs(edge_change(control.folded, control.unfolded))),
+        volume_folded=float(before.sum()),
+        volume_unfolded=float(after.sum()),
+        inverted_folded=int(np.count_nonzero(before <= 0)),
+        inverted_unfolded=int(np.count_nonzero(after <= 0)),
+    )
+
+
+def assess_points(folded: Floats, unfolded: Floats, volume: float, k: int = NEIGHBOURS) -> Quality:
+    """Return the quality of an unfolding without a control mesh, by each block's neighbours.
+
+    The deformation gradient at a block is the linear map that takes the offsets of its k
+    neighbours nearest to their images, in the least squares.
+
+    Parameters
+    ----------
+    folded, unfolded : (n, 3) float
+        The blocks in both spaces, in the same unit; those without an image are NaN when unfolded,
+        have NaN figures and are no other block's neighbours.
+    volume : float
+        Of one block.
+    k : int
+        Number of neighbours.
+
+    Raises
+    ------
+    InputError
+        Too few points with an image.
+    ControlMeshError
+        Neighbours that lie in one plane across the layers when unfolded.
+    """
+    placed = np.isfinite(unfolded).all(axis=1)
+    X, Y = folded[placed], unfolded[placed]
+    ids = neighbours(X, k)
+    d = distortion(neighbour_gradients(X, Y, ids))
+    pairs = np.stack([np.repeat(np.arange(len(X)), _SIDES), ids[:, :_SIDES].ravel()], axis=1)
+
+    def spread(values: Floats) -> Floats:
+        out = np.full(len(folded), np.nan)
+        out[placed] = values
+        return out
+
+    changed = epsilon(X, Y, k)
+    return Quality(
+        blocks=BlockQuality(
+            volume_ratio=spread(d.volume_ratio),
+            nmd_error=spread(changed),
+            stretch_min=spread(d.stretch_min),
+            stretch_max=spread(d.stretch_max),
+            shear=spread(d.shear),
+        ),
+        nmd=Statistics.of(changed),
+        shear=Statistics.of(d.shear),
+        volume_change=Statistics.of(np.abs(d.volume_ratio - 1)),
+        edge_change=Statistics.of(np.abs(distance_ratios(X, Y, pairs) - 1)),
+        volume_folded=volume * len(X),
+        volume_unfolded=float(volume * d.volume_ratio.sum()),
+        inverted_folded=0,
+        inverted_unfolded=int(np.count_nonzero(d.volume_ratio <= 0)),
+    )
+
+
+def neighbour_gradients(X: Floats, Y: Floats, ids: Ints) -> Floats:
+    """Return the linear map (n, 3, 3) of each point's neighbourhood, in the least squares.
+
+    Where the neighbours lie in a plane, the plane's normal is taken to its image's unit normal.
+
+    Parameters
+    ----------
+    X, Y : (n, 3) float
+        Points in both spaces.
+    ids : (n, k) int
+        Each point's neighbours.
+    """
+    C, D = np.empty((len(X), 3, 3)), np.empty((len(X), 3, 3))
+    for start in range(0, len(X), CACHED):
+        rows = slice(start, start + CACHED)
+        a, b = X[ids[rows]] - X[rows, None], Y[ids[rows]] - Y[rows, None]
+        C[rows] = np.einsum("nki,nkj->nij", a, a)
+        D[rows] = np.einsum("nki,nkj->nij", b, a)
+    value, axes = np.linalg.eigh(C)
+    flat = value[:, 0] < _PLANE * value[:, 2]
+    inverse = np.where(flat, 0.0, 1 / np.where(flat, 1.0, value[:, 0]))
+    weights = np.column_stack([inverse, 1 / value[:, 1:]])
+    J: Floats = D @ np.einsum("nik,nk,njk->nij", axes, weights, axes)
+    if flat.any():
+        e, part = axes[flat], J[flat]
+        normal = np.cross(e[:, :, 1], e[:, :, 2])
+        image = np.cross(
+            np.einsum("nij,nj->ni", part, e[:, :, 1]), np.einsum("nij,nj->ni", part, e[:, :, 2])
+        )
+        image /= np.linalg.norm(image, axis=1, keepdims=True)
+        J[flat] = part + image[:, :, None] * normal[:, None, :]
+    return J

@@ -1,0 +1,161 @@
+"""Neighbours of blocks on a lattice, by counting cells instead of searching a tree.
+
+A block's nearest neighbours are the occupied cells at the shortest offsets.  The offsets are put in
+order once, equally long ones together; most blocks have their neighbours at the first of them, and
+those at the body's surface go on along the list.  Where more blocks are equally near than there is
+room for among the k nearest, their mean counts for each: nothing depends on which would be taken.
+
+Blocks are taken in the order of their cells, some thousands at a time, each time with a table of
+the cells around those alone: memory does not grow with the body.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from geounfold.backends.threads import over_slices
+from geounfold.geometry.measures import lengths_between
+from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers
+
+_OFFSETS = 640  # tried for a block; one on a sheet of one block's edge needs some 110 for 26
+_SLICE = 1 << 14  # blocks at once
+_WINDOW = 1 << 26  # cells in a table, at most: 256 MB
+
+
+def offsets_by_length(sides: Floats, count: int = _OFFSETS) -> list[Ints]:
+    """Return the ``count`` shortest offsets between lattice cells, shortest first, or a few more.
+
+    Parameters
+    ----------
+    sides : (3,) float
+        Sides of a cell.
+
+    Returns
+    -------
+    list of (s, 3) int
+        Those of one length together.
+
+    Examples
+    --------
+    >>> [o.tolist() for o in offsets_by_length(np.array([1.0, 2.0, 0.5]), 3)]
+    [[[0, 0, -1], [0, 0, 1]], [[-1, 0, 0], [0, 0, -2], [0, 0, 2], [1, 0, 0]]]
+    """
+    radius = float(np.cbrt(count * np.prod(sides)))  # a ball of it holds 4.2 times so many
+    reach = np.ceil(radius / sides).astype(np.int64)
+    every = np.array([o for o in product(*(range(-r, r + 1) for r in reach)) if any(o)])
+    square = np.round(((every * sides) ** 2).sum(axis=1) / radius**2, 9)
+    order = np.argsort(square, kind="stable")
+    fresh = np.flatnonzero(np.diff(square[order])) + 1
+    shells = np.split(every[order], fresh)
+    size = np.cumsum([len(shell) for shell in shells])
+    return shells[: int(np.searchsorted(size, count)) + 1]
+
+
+def lattice_nmd(
+    cells: Ints, sides: Floats, clouds: tuple[Floats, ...], k: int
+) -> tuple[Floats, ...] | None:
+    """Return the mean distance to the k nearest neighbours on a lattice, in several spaces.
+
+    Neighbours are the nearest by their cells: neither the order of the rows nor rounding of the
+    coordinates changes them.
+
+    Parameters
+    ----------
+    cells : (n, 3) int
+        Lattice cell of every block, all different.
+    sides : (3,) float
+        Sides of a cell.
+    clouds : tuple of (n, 3) float
+        The blocks in each space.
+    k : int
+        Number of neighbours.
+
+    Returns
+    -------
+    tuple of (n,) float, or None
+        In the unit of each cloud; NaN for a block that has fewer than k neighbours at the
+        offsets tried.  None where two blocks share a cell, or the body is too sparse in its box.
+    """
+    shells = offsets_by_length(sides)
+    offsets = np.concatenate(shells)
+    if k > len(offsets) or not len(cells):
+        return None
+    low = cells.min(axis=0) - np.abs(offsets).max(axis=0)
+    shape = cells.max(axis=0) + np.abs(offsets).max(axis=0) - low + 1
+    turn = np.argsort(-shape, kind="stable")  # the longest axis is the slowest: narrow windows
+    cells, shape, low = cells[:, turn], shape[turn], low[turn]
+    if float(np.prod(shape.astype(float))) > 2.0**62:
+        return None
+    stride = np.array([shape[1] * shape[2], shape[2], 1])
+    keys = (cells - low) @ stride
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    if (keys[1:] == keys[:-1]).any():
+        return None
+    steps = [shell[:, turn] @ stride for shell in shells]
+    margin = int(max(step.max() for step in steps))
+    ends = np.minimum(np.arange(0, len(keys), _SLICE) + _SLICE, len(keys)) - 1
+    spans = keys[ends] - keys[::_SLICE] + 1 + 2 * margin
+    if spans.max() > _WINDOW:
+        return None
+    axes = [[np.ascontiguousarray(c) for c in cloud[order].T] for cloud in clouds]
+    out = tuple(np.empty(len(keys)) for _ in clouds)
+
+    def work(rows: slice) -> None:
+        first = keys[rows.start] - margin
+        last = keys[rows.stop - 1] + margin
+        a, b = np.searchsorted(keys, [first, last + 1])
+        table = np.full(last - first + 1, -1, dtype=np.int32)
+        table[keys[a:b] - first] = np.arange(b - a, dtype=np.int32)
+        near = [[c[a:b] for c in cloud] for cloud in axes]
+        at = keys[rows] - first
+        for values, result in zip(out, _means(table, at, steps, near, k), strict=True):
+            values[order[rows]] = result
+
+    over_slices(work, len(keys), _SLICE)
+    return out
+
+
+def _means(
+    table: Numbers, at: Ints, steps: list[Ints], near: list[list[Floats]], k: int
+) -> list[Floats]:
+    """Return the mean distance of the blocks at places of a table of rows, (m,) per space."""
+    own = table[at]
+    here = [[c[own] for c in cloud] for cloud in near]
+    sums = [np.zeros(len(at)) for _ in near]
+    whole: Bools = np.ones(len(at), dtype=bool)
+    taken = 0
+    for shell in steps:
+        weight = min(1.0, (k - taken) / len(shell))
+        for step in shell:
+            other = table.take(at + step)
+            whole &= other >= 0
+            for total, mine, theirs in zip(sums, here, near, strict=True):
+                length = lengths_between(mine, [c.take(other, mode="wrap") for c in theirs])
+                total += length if weight == 1 else weight * length
+        taken += len(shell)
+        if taken >= k:
+            break
+    lacking = np.flatnonzero(~whole)
+    for total in sums:
+        total[lacking] = 0.0
+    count = np.zeros(len(lacking), dtype=np.int64)
+    for shell in steps:
+        other = table[at[lacking, None] + shell]
+        row, column = np.nonzero(other >= 0)
+        block, other = lacking[row], other[row, column]
+        there = np.bincount(row, minlength=len(lacking))
+        share = np.minimum(k - count, there) / np.maximum(there, 1)
+        for total, mine, theirs in zip(sums, here, near, strict=True):
+            length = lengths_between([c[block] for c in mine], [c[other] for c in theirs])
+            total[lacking] += share * np.bincount(row, length, len(lacking))
+        count += there
+        lacking, count = lacking[count < k], count[count < k]
+        if not len(lacking):
+            break
+    for total in sums:
+        total[lacking] = np.nan
+        total /= k
+    return sums

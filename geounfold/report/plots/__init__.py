@@ -1,0 +1,1 @@
+"""Pictures: bodies, surfaces, grades, comparisons."""

@@ -1,0 +1,65 @@
+"""Colours and options that all pictures share."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geounfold.errors import MissingDependencyError, OptionError
+
+Image = NDArray[np.uint8]
+
+
+Limits = tuple[float, float]
+
+
+# Okabe and Ito's colours, which stay apart for colour-blind readers.
+TOP, BOTTOM, RIM, UNDECIDED = "#0072B2", "#E69F00", "#999999", "#CC79A7"
+
+
+LIBRARIES = ("libX11.so.6", "libGL.so.1", "libEGL.so.1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions:
+    """How bodies are looked at.
+
+    Parameters
+    ----------
+    azimuth : float
+        Degrees anticlockwise from east to where the viewer stands.
+    elevation : float
+        Degrees above the horizon, -90 to 90.
+    size : (int, int)
+        Width and height of each three-dimensional view, pixels.
+    max_blocks : int
+        Blocks drawn at most; of more that can be seen, every second, third ... is drawn.
+    """
+
+    azimuth: float = -65.0
+    elevation: float = 24.0
+    size: tuple[int, int] = (900, 620)
+    max_blocks: int = 200_000
+
+    def __post_init__(self) -> None:
+        if not -90 <= self.elevation <= 90:
+            raise OptionError(f"elevation must be -90 to 90 degrees, but is {self.elevation}")
+        if min(self.size) < 16 or max(self.size) > 8192:
+            raise OptionError(f"size must be 16 to 8192 pixels a side, but is {self.size}")
+        if self.max_blocks < 1:
+            raise OptionError(f"max_blocks must be at least 1, but is {self.max_blocks}")
+
+
+def require(name: str) -> Any:
+    """Import an optional library, or raise MissingDependencyError saying how to get it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"pictures need {name.partition('.')[0]}, which cannot be imported ({error}): "
+            "pip install matplotlib pyvista"
+        ) from error

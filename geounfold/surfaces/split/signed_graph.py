@@ -1,0 +1,115 @@
+"""The signed graph of a hull's faces and its lowest eigenvector."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from geounfold.errors import SplitError
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.surfaces.split.faces import CREASE_WIDTH, Faces, valleys
+
+WEAKEST_PULL = 1e-3  # pull that is left across the sharpest edge
+
+
+COARSE_ABOVE = 12_000  # faces above which the graph is contracted before it is solved
+
+
+COARSENINGS = 2  # rounds of contraction, each to about 40 % of the nodes
+
+
+SMOOTHINGS = 15  # damped Jacobi sweeps after it
+
+
+def signed_laplacian(faces: Faces) -> sp.csc_array:
+    """Return D - A + B: A the pull of neighbours, B the push of opposite faces (symmetrised)."""
+    n = len(faces.normal)
+    i, j = np.repeat(np.arange(n), 3), faces.adjacency.ravel()
+    cosine = np.einsum("ij,ij->i", faces.normal[i], faces.normal[j]).clip(-1, 1)
+    pull = (
+        np.where(valleys(faces, faces.normal).ravel(), 1.0, np.exp((cosine - 1) / CREASE_WIDTH))
+        + WEAKEST_PULL
+    )
+    seen = np.flatnonzero(faces.facing > 0)
+    hit = faces.hit[seen]
+    push = faces.facing[seen] ** 2 * np.exp(-faces.distance[seen] / faces.median) / 2
+    rows, columns = np.concatenate([i, seen, hit]), np.concatenate([j, hit, seen])
+    degree = np.bincount(rows, np.concatenate([pull, push, push]), n)
+    values = np.concatenate([degree, -pull, push, push])
+    diagonal = np.arange(n)
+    at = np.concatenate([diagonal, rows]), np.concatenate([diagonal, columns])
+    return sp.coo_array((values, at), (n, n)).tocsc()
+
+
+def lowest_vector(L: sp.csc_array) -> Floats:
+    """Return the eigenvector (n,) of the lowest eigenvalue of the signed Laplacian.
+
+    A large graph is first contracted along its strongest pulls, so that the factorisation stays
+    small; the eigenvector of the contracted graph, constant on each cluster, is then smoothed.
+    """
+    if L.shape[0] <= COARSE_ABOVE:
+        return _lowest_exact(L)[1]
+    cluster = _clusters(L, COARSENINGS)
+    size = np.bincount(cluster)
+    scale = 1 / np.sqrt(size)
+    coarse = _contract(L, cluster)
+    value, y = _lowest_exact(sp.csc_array(sp.diags_array(scale) @ coarse @ sp.diags_array(scale)))
+    x: Floats = (scale * y)[cluster]
+    diagonal = L.diagonal()
+    for _ in range(SMOOTHINGS):
+        x = x - 0.6 * (L @ x - value * x) / diagonal
+    return x
+
+
+def _lowest_exact(L: sp.csc_array) -> tuple[float, Floats]:
+    """Return the lowest eigenvalue and its eigenvector, by shift-invert Lanczos."""
+    n = L.shape[0]
+    shifted = sp.csc_array(L + 1e-6 * sp.eye_array(n))
+    lu = spl.splu(shifted, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    solve = spl.LinearOperator((n, n), matvec=lu.solve, dtype=np.float64)
+    start = np.cos(np.arange(n) * 2.399963)
+    options = {"sigma": -1e-6, "which": "LM", "OPinv": solve, "v0": start, "tol": 1e-6}
+    try:
+        values, vectors = spl.eigsh(L, k=1, ncv=min(n, 12), **options)
+    except spl.ArpackNoConvergence as error:
+        raise SplitError("the signed split did not converge; try split 'normal'") from error
+    return float(values[0]), vectors[:, 0]
+
+
+def _clusters(L: sp.csc_array, rounds: int) -> Ints:
+    """Return a cluster for each node, (n,): mutual strongest pulls are joined, round by round."""
+    cluster = np.arange(L.shape[0])
+    for _ in range(rounds):
+        joined = _match(L)
+        cluster = joined[cluster]
+        L = _contract(L, joined)
+    return cluster
+
+
+def _match(L: sp.csc_array) -> Ints:
+    """Return a cluster number per node, (n,): pairs that pull each other most, and followers.
+
+    Equal pulls are told apart by a fixed hash of the pair, so that a flat face is cut into
+    compact clusters.
+    """
+    graph = L.tocoo()
+    pulls = (graph.row != graph.col) & (graph.data < 0)
+    row, column = graph.row[pulls].astype(np.int64), graph.col[pulls].astype(np.int64)
+    low, high = np.minimum(row, column), np.maximum(row, column)
+    order = np.lexsort(((low * 7919 + high * 104729) % 1000003, -graph.data[pulls].round(6), row))
+    last = np.append(row[order][1:] != row[order][:-1], True)
+    own = np.arange(L.shape[0])
+    best = own.copy()
+    best[row[order][last]] = column[order][last]
+    mutual = best[best] == own
+    root = np.where(mutual, np.minimum(best, own), own)
+    root = np.where(mutual, root, root[best])
+    return np.unique(root, return_inverse=True)[1].astype(np.int64)
+
+
+def _contract(L: sp.csc_array, cluster: Ints) -> sp.csc_array:
+    """Return the Laplacian of the graph whose nodes are the clusters of L's."""
+    graph = L.tocoo()
+    n = int(cluster.max()) + 1
+    return sp.coo_array((graph.data, (cluster[graph.row], cluster[graph.col])), (n, n)).tocsc()

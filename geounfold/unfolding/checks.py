@@ -1,0 +1,102 @@
+"""Checks of an unfolding's answer: proved, placed, not torn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from geounfold.errors import ControlMeshError, OptionError
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.mapping.carried import Carried, Returned
+from geounfold.mapping.certificate import Certificate
+from geounfold.methods import METHODS, no_mesh
+from geounfold.quality.blocks import Quality
+from geounfold.unfolding.options import UnfoldOptions
+
+
+def check_method(options: UnfoldOptions) -> None:
+    """Raise OptionError where the method proves nothing, unless that is allowed."""
+    if METHODS[options.method].control:
+        return
+    if options.coordinates != "tet":
+        raise OptionError(
+            no_mesh(options.method, f"--coordinates {options.coordinates} has no prisms to go by")
+        )
+    if options.allow_uncertified:
+        return
+    raise OptionError(
+        no_mesh(options.method, "nothing is proved of its map")
+        + ", or --allow-uncertified to write the answer all the same"
+    )
+
+
+def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
+    """Raise OptionError where a method without a control mesh is to unfold several bodies."""
+    if len(groups) > 1 and not METHODS[options.method].control:
+        raise OptionError(
+            no_mesh(options.method, "it unfolds one body at a time") + ", or choose one by --body"
+        )
+
+
+def check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError where neighbours were torn apart, unless that is allowed."""
+    if not len(torn) or options.allow_uncertified:
+        return
+    where = ", ".join(f"{c:.6g}" for c in np.median(folded[torn], axis=0))
+    raise ControlMeshError(
+        f"{len(torn)} of {len(folded)} blocks were torn from their neighbours, around ({where}): "
+        "limbs too close together, or a sheet too narrow for its thickness; try another --hull, "
+        "or --allow-uncertified to write the answer all the same"
+    )
+
+
+def check_coordinates(
+    quality: Quality, returned: Returned | None, folded: Floats, options: UnfoldOptions
+) -> None:
+    """Raise ControlMeshError where a prism's coordinates fold or do not come back.
+
+    Unless that is allowed.  That they do neither at any block is no proof.
+    """
+    if options.coordinates == "tet" or options.allow_uncertified or returned is None:
+        return
+    lost = returned.lost
+    over = quality.blocks.volume_ratio <= 0
+    wrong = over | lost
+    if not wrong.any():
+        return
+    where = ", ".join(f"{c:.6g}" for c in np.median(folded[wrong], axis=0))
+    raise ControlMeshError(
+        f"{options.coordinates} coordinates turn {int(over.sum())} of {len(folded)} blocks inside "
+        f"out and bring {int(lost.sum())} not back, around ({where}): use --coordinates tet, or "
+        "--allow-uncertified to write the answer all the same"
+    )
+
+
+def check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError where the map is not proved, unless that is allowed."""
+    if certificate.injective or options.allow_uncertified:
+        return
+    place = certificate.folded[np.argmax(certificate.blocks)] if len(certificate.folded) else []
+    where = ", ".join(f"{c:.6g}" for c in place)
+    raise ControlMeshError(
+        f"the map is not one-to-one: {', '.join(certificate.faults)}, "
+        f"with {int(certificate.blocks.sum())} blocks, most of them around ({where}); the fold is "
+        "too tight there for this block size: try another --hull or --flattener, or "
+        "--allow-uncertified to write the answer all the same"
+    )
+
+
+def check_placed(
+    groups: Sequence[Ints], folded: Floats, carried: Carried, options: UnfoldOptions
+) -> None:
+    """Raise ControlMeshError where blocks of a body have no image, unless that is allowed."""
+    rows = np.concatenate([group[~carried.placed[group]] for group in groups])
+    if not len(rows) or options.allow_uncertified:
+        return
+    where = ", ".join(f"{c:.6g}" for c in np.median(folded[rows], axis=0))
+    raise ControlMeshError(
+        f"{len(rows)} of {len(folded)} blocks lie outside the control mesh and farther than its "
+        f"reach, around ({where}): try another --hull, a larger --reach, or --allow-uncertified "
+        "to leave them empty"
+    )

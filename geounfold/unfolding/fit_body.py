@@ -1,0 +1,135 @@
+"""Fit one body: hull, split, map by the chosen method; all in working units."""
+
+from __future__ import annotations
+
+from geounfold.body.merged_blocks import merged, merges
+from geounfold.body.prepare import BodyPoints
+from geounfold.body.scattered import scattered
+from geounfold.body.working_frame import Frame
+from geounfold.errors import (
+    BackendError,
+    ControlMeshError,
+    FlatteningError,
+    HullError,
+    NoSheetError,
+    SplitError,
+)
+from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.methods import METHODS, BodyFit, PreparedBody, SurfacePair
+from geounfold.methods.contract import Stage, mean_top_normal
+from geounfold.methods.turned_over import OTHER_SIDE, turned_over
+from geounfold.surfaces.given import split_reference
+from geounfold.surfaces.hull import extract_hull
+from geounfold.surfaces.split import split
+from geounfold.surfaces.split.result import SurfaceSplit
+from geounfold.unfolding.options import UnfoldOptions
+
+__all__ = ["BodyFit", "Stage", "SurfacePair", "fit", "top_looks_down"]
+
+
+def fit(
+    body: BodyPoints,
+    frame: Frame,
+    options: UnfoldOptions,
+    reference: tuple[TriMesh, TriMesh] | None,
+    stage: Stage,
+) -> BodyFit:
+    """Return the fit of one body.
+
+    Parameters
+    ----------
+    body : BodyPoints
+        Its points, working units.
+    frame : Frame
+        Working frame.
+    options : UnfoldOptions
+        Which method, flattener, hull and split.
+    reference : (TriMesh, TriMesh) or None
+        Top and bottom given by the user, working units.
+    stage : callable
+        Times and names a stage: ``with stage("hull"):``.
+
+    Raises
+    ------
+    HullError, NoSheetError, SplitError, FlatteningError
+        As the stages do.
+    """
+    with stage("hull"):
+        tried = _merges(body.fitted, frame, options, reference)
+    for merge in tried:
+        try:
+            return _fit_at(merge, body, frame, options, reference, stage)
+        except _TOO_COARSE:
+            continue
+    return _fit_at(1, body, frame, options, reference, stage)
+
+
+_TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoSheetError, SplitError)
+"""What a body's shape may do to merged blocks and not to the blocks themselves."""
+
+
+def _merges(
+    points: Floats, frame: Frame, options: UnfoldOptions, reference: object
+) -> tuple[int, ...]:
+    """Return how many blocks to merge along a cell's side, the most first (see merges).
+
+    Scattered points are left as they are: nothing tells how full such cells are.
+    """
+    chosen = options.sheet_options.coarse
+    if reference is not None or options.method != "sheet" or len(points) <= chosen.blocks:
+        return ()
+    if frame.steps is None and scattered(points):
+        return ()
+    return merges(points, frame.steps, chosen)
+
+
+def _fit_at(
+    merge: int,
+    body: BodyPoints,
+    frame: Frame,
+    options: UnfoldOptions,
+    reference: tuple[TriMesh, TriMesh] | None,
+    stage: Stage,
+) -> BodyFit:
+    """Return the fit to cells of ``merge`` blocks a side, or, at 1, to the blocks (see fit)."""
+    points, method, hull, coarse = body.fitted, METHODS[options.method], None, None
+    if reference is None:
+        with stage("hull"):
+            name = method.hull if options.hull == "auto" else options.hull
+            coarse = merged(points, frame.steps, merge) if merge > 1 else None
+            cells, share = (points, None) if coarse is None else (coarse.points, coarse.share)
+            hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
+        with stage("split"):
+            parts = split(hull.mesh, options.split)
+    else:
+        with stage("split"):
+            parts = split_reference(*reference)
+    up = frame.up_in_work(options.up)
+    over = top_looks_down(parts, up)
+    prepared = PreparedBody(
+        points=points,
+        blocks=body.blocks,
+        frame=frame,
+        hull=hull,
+        split=parts,
+        up=up,
+        datum=OTHER_SIDE.get(options.datum, options.datum) if over else options.datum,
+        flattener=options.flattener,
+        reach=options.reach,
+        options=getattr(options, method.options),
+        sheet_options=options.sheet_options,
+        stage=stage,
+        coarse=coarse,
+    )
+    result = method.fit(prepared)
+    return turned_over(result) if over else result
+
+
+def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
+    """Return whether the split's top side looks away from up, (3,) in working units.
+
+    Decided once for the whole sheet by the area-weighted normals of its top; a sheet whose
+    mean normal is square to up (within 3 degrees) keeps the top the split chose.
+    """
+    mean = mean_top_normal(parts)
+    return bool(mean @ up < -0.05 * float((mean @ mean) ** 0.5))

@@ -1,0 +1,140 @@
+"""What a map does with the points of its run: where they go, what is proved, how good it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geounfold.body.prepare import PreparedPoints
+from geounfold.body.working_frame import Frame
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.mapping.carried import Carried, Returned
+from geounfold.mapping.certificate import Certificate, certify
+from geounfold.mapping.control_mesh import ControlMesh, scaled
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.methods import PointwiseMap
+from geounfold.methods.contract import Stage
+from geounfold.quality.blocks import Quality, assess, assess_points
+from geounfold.quality.torn_blocks import SUSPECT, torn_blocks
+from geounfold.unfolding.checks import (
+    check_certified,
+    check_coordinates,
+    check_placed,
+    check_torn,
+)
+from geounfold.unfolding.options import UnfoldOptions
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The points carried by the map, and what was checked and measured of them.
+
+    Attributes
+    ----------
+    carried : Carried
+        The points in the flat space.
+    returned : Returned or None
+        The same brought back; None if the method has no way back.
+    certificate : Certificate
+        What is proved of the map.
+    quality : Quality
+        Figures for the whole and per block.
+    torn : (k,) int
+        Rows of blocks that came to lie far from a block that they touch.
+    """
+
+    carried: Carried
+    returned: Returned | None
+    certificate: Certificate
+    quality: Quality
+    torn: Ints
+
+
+def measure(
+    mapping: UnfoldingMap | PointwiseMap,
+    prepared: PreparedPoints,
+    options: UnfoldOptions,
+    stage: Stage,
+) -> Measured:
+    """Carry the points by a map, and check and measure the answer.
+
+    Raises
+    ------
+    ControlMeshError
+        The answer is not proved one-to-one, leaves blocks of a body without an image, or tears
+        blocks apart, and ``options.allow_uncertified`` is not set.
+    """
+    P, frame = prepared.points, prepared.frame
+    with stage("map"):
+        carried = mapping.carry(P)
+        returned = mapping.returned(P, carried)
+    with stage("certificate"):
+        certificate = _certificate(mapping, carried, frame)
+    check_certified(certificate, options)
+    check_placed(prepared.groups, P, carried, options)
+    with stage("quality"):
+        quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
+        torn = _torn(prepared.groups, prepared.work, carried, quality, frame)
+    check_coordinates(quality, returned, P, options)
+    check_torn(torn, P, options)
+    return Measured(carried, returned, certificate, quality, torn)
+
+
+def in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
+    """Return a control mesh in the data's coordinates and unit."""
+    return scaled(control, frame.to_world(control.folded.V), frame.scale)
+
+
+def _torn(
+    groups: Sequence[Ints], work: Floats, carried: Carried, quality: Quality, frame: Frame
+) -> Ints:
+    """Return the rows whose touching blocks in their own body came to lie far away."""
+    flat = carried.points / frame.scale
+    found = []
+    for group in groups:
+        rows = group[carried.placed[group]]
+        suspects = np.flatnonzero(quality.blocks.nmd_error[rows] > SUSPECT)
+        found.append(rows[torn_blocks(work[rows], flat[rows], frame.sides, suspects)])
+    return np.concatenate(found)
+
+
+def _gradients(mapping: UnfoldingMap, folded: Floats, carried: Carried) -> Floats | None:
+    """Return the gradients at points with an image; None where they are the tetrahedra's."""
+    if mapping.prisms is None:
+        return None
+    return mapping.gradients(folded[carried.placed], carried.element[carried.placed])
+
+
+def _certificate(
+    mapping: UnfoldingMap | PointwiseMap, carried: Carried, frame: Frame
+) -> Certificate:
+    """Return what is proved of a map, places in the data's coordinates and unit."""
+    if isinstance(mapping, PointwiseMap):
+        return Certificate.unproved(mapping.fault)
+    return _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
+
+
+def _quality(
+    mapping: UnfoldingMap | PointwiseMap,
+    carried: Carried,
+    P: Floats,
+    frame: Frame,
+    given: Floats,
+    k: int,
+) -> Quality:
+    """Return how good the answer is: by the control mesh, or by each block's neighbours."""
+    if isinstance(mapping, PointwiseMap):
+        return assess_points(P, carried.points, frame.scale**3, k)
+    world, whole = (in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
+    gradients = _gradients(mapping, P, carried)
+    cells = frame.cells(given)
+    lattice = None if cells is None or frame.steps is None else (cells, frame.steps)
+    return assess(world, whole, carried.element, P, carried.points, k, gradients, lattice)
+
+
+def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
+    """Return a certificate whose places are in the data's coordinates and unit."""
+    folded = frame.to_world(certificate.folded)
+    return replace(certificate, folded=folded, unfolded=certificate.unfolded * frame.scale)

@@ -1,0 +1,303 @@
+"""The result of an unfolding."""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, overload
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import OptionError
+from geounfold.geometry.mesh import Floats, Space, TriMesh, in_space
+from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, with_carried
+from geounfold.mapping.control_mesh import ControlMesh
+from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
+from geounfold.surfaces.hull import Hull
+from geounfold.unfolding.measured import in_world
+from geounfold.unfolding.notebook_card import Facts
+from geounfold.unfolding.summary import RunRecord, summarise, warnings_of
+
+if TYPE_CHECKING:
+    import dask.dataframe
+    import pyvista
+
+
+class Unfolding:
+    """An unfolded body: its points, the map both ways, every stage's meshes, the figures.
+
+    Made by ``unfold``; all coordinates are true to scale, in the input's unit.
+
+    Attributes
+    ----------
+    folded : (n, 3) float
+        The points as given.
+    points : (n, 3) float
+        The points unfolded, in the same order; z is the stratigraphic coordinate.
+    stratigraphic : (n,) float
+        0 at the bottom surface, 1 at the top.
+    location : (n,) str
+        ``inside`` the control mesh, ``extrapolated`` around it, or ``outside``: left empty.
+    options : UnfoldOptions
+        As used.
+    frame : Frame
+        The working frame.
+    lattice : Lattice or None
+        The block lattice, None for scattered points.
+    fits : list of BodyFit
+        Every stage, in working units, one per body.
+    map : UnfoldingMap or PointwiseMap
+        Carries any points both ways; the latter, of methods without a control mesh, can neither
+        be saved nor proved.
+    quality : Quality
+        Figures for the whole and per block.
+    certificate : Certificate
+        What is proved of the map, and what stands against it; also a mapping.
+    seconds : dict of float
+        Per stage.
+    """
+
+    def __init__(self, record: RunRecord, given: pd.DataFrame | None = None) -> None:
+        """Keep a run's record, and the DataFrame that the points came in, if there was one."""
+        self._record = record
+        self._given = None if given is None else given.copy()
+        prepared, measured = record.prepared, record.measured
+        self.options = record.options
+        self.folded = prepared.points
+        self.frame = prepared.frame
+        self.lattice = prepared.lattice
+        self.fits = record.fits
+        self.map = record.map
+        self.carried = measured.carried
+        self.quality = measured.quality
+        self.certificate = measured.certificate
+        self.seconds = record.seconds
+
+    @property
+    def points(self) -> Floats:
+        """The unfolded points, (n, 3)."""
+        return self.carried.points
+
+    @property
+    def stratigraphic(self) -> Floats:
+        """0 at the bottom surface, 1 at the top, (n,)."""
+        return self.carried.stratigraphic
+
+    @property
+    def location(self) -> np.ndarray:
+        """``inside``, ``extrapolated`` or ``outside`` (empty) for every point, (n,) of str."""
+        return self.carried.location
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear."""
+        return self.quality.blocks.columns()
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The DataFrame given, or x, y and z of an array, with all results as further columns.
+
+        Index, columns, their order and types are as given; a column called as a result is
+        replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
+        stratigraphic, location, mesh_distance and those of ``columns``.
+        """
+        given = self._given
+        if given is None:
+            given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
+        return given.assign(**result_columns(UNFOLDED, self.carried), **self.columns)
+
+    def to_flat(self, points: Floats) -> Floats:
+        """Return other folded points (m, 3) in the flat space."""
+        return self.map.to_flat(points)
+
+    def to_folded(self, points: Floats) -> Floats:
+        """Return points of the flat space (m, 3) in the folded one."""
+        return self.map.to_folded(points)
+
+    @overload
+    def transform(self, points: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def transform(self, points: Floats) -> Floats: ...
+    def transform(self, points: Floats | pd.DataFrame) -> Floats | pd.DataFrame:
+        """Return other folded points in the flat space.
+
+        Parameters
+        ----------
+        points : (m, 3) array or DataFrame
+            Of a DataFrame the coordinate columns are found by name.
+
+        Returns
+        -------
+        (m, 3) array or DataFrame
+            As given; a DataFrame with its index and columns, and unfolded_x, unfolded_y,
+            unfolded_z, stratigraphic, location and mesh_distance.  Points beyond the map's reach
+            are NaN.
+
+        Raises
+        ------
+        InputError
+            Coordinates that are missing, infinite or no numbers.
+        """
+        if isinstance(points, pd.DataFrame):
+            return with_carried(points, self.map.carry, UNFOLDED)
+        return self.to_flat(points)
+
+    @overload
+    def inverse_transform(self, points: pd.DataFrame) -> pd.DataFrame: ...
+    @overload
+    def inverse_transform(self, points: Floats) -> Floats: ...
+    def inverse_transform(self, points: Floats | pd.DataFrame) -> Floats | pd.DataFrame:
+        """Return points of the flat space in the folded one.
+
+        As ``transform``; a DataFrame's columns unfolded_x, unfolded_y, unfolded_z are taken
+        before others, and it gets folded_x, folded_y, folded_z, location and mesh_distance.
+        """
+        if isinstance(points, pd.DataFrame):
+            return with_carried(points, partial(self.map.carry, inverse=True), FOLDED)
+        return self.to_folded(points)
+
+    def map_partitions(self, frame: dask.dataframe.DataFrame) -> dask.dataframe.DataFrame:
+        """Return a Dask DataFrame's points in the flat space, lazily, with ``transform``'s columns.
+
+        The map is sent to the workers, not the points to it; see `geounfold.map_partitions`,
+        which takes a map that was loaded and goes back as well.
+        """
+        from geounfold.unfolding.dask_map import map_partitions
+
+        return map_partitions(self.map, frame)
+
+    def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
+        """Return the points in one space with all columns, the other space as an array.
+
+        Parameters
+        ----------
+        space : {"folded", "unfolded"}
+            Where the points lie; the point data of the other's name, (n, 3), holds where they
+            lie there.  Unfolded, points without an image (location outside) are left out.
+        """
+        from geounfold.io.formats.vtk import cloud
+
+        here, there, other = in_space(space, self.folded, self.points)
+        keep = np.isfinite(here).all(axis=1)
+        columns = {str(name): _plain_column(c)[keep] for name, c in self.table.items()}
+        made = cloud(here[keep], columns)
+        made.point_data[other] = there[keep]
+        return made
+
+    @property
+    def hull(self) -> Hull | None:
+        """The (largest) body's hull, in working units; None with reference surfaces."""
+        return self.fits[0].hull
+
+    @property
+    def hull_mesh(self) -> TriMesh:
+        """The (largest) body's split surface in the data's coordinates."""
+        mesh = self.fits[0].split.mesh
+        return mesh.with_vertices(self.frame.to_world(mesh.V))
+
+    @cached_property
+    def surfaces(self) -> dict[str, SurfacePair]:
+        """Top, bottom and mid surface of the (largest) body, folded and unfolded."""
+        return {
+            name: SurfacePair(
+                pair.folded.with_vertices(self.frame.to_world(pair.folded.V)),
+                pair.unfolded.with_vertices(pair.unfolded.V * self.frame.scale),
+                pair.flattening,
+            )
+            for name, pair in self.fits[0].surfaces.items()
+        }
+
+    @property
+    def top(self) -> SurfacePair:
+        """The hanging wall in both spaces."""
+        return self.surfaces["top"]
+
+    @property
+    def bottom(self) -> SurfacePair:
+        """The footwall in both spaces."""
+        return self.surfaces["bottom"]
+
+    @cached_property
+    def control(self) -> ControlMesh:
+        """The control mesh in the data's coordinates and unit.
+
+        Raises
+        ------
+        OptionError
+            The method has none.
+        """
+        if isinstance(self.map, PointwiseMap):
+            raise OptionError(no_mesh(self.options.method, "there is none to return"))
+        return in_world(self.map.control, self.frame)
+
+    @property
+    def torn(self) -> int:
+        """Number of blocks that came to lie far from a block that they touch."""
+        return len(self._record.measured.torn)
+
+    @property
+    def outside_share(self) -> float:
+        """Share of the points that the control mesh does not hold."""
+        return float(np.mean(~self.carried.inside))
+
+    @property
+    def round_trip_max(self) -> float | None:
+        """Largest distance between a point and its return, over those that have both.
+
+        None where the method has no way back.
+        """
+        return self._record.round_trip_max
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the map (not the points) as .npz; ``geounfold.load`` reads it.
+
+        Raises
+        ------
+        OptionError
+            The method has no control mesh.
+        """
+        self.map.save(path)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ran and how good it is, ready for JSON."""
+        return summarise(self._record, self.surfaces)
+
+    @property
+    def injective(self) -> bool:
+        """Whether the map is proved one-to-one: the certificate covers tetrahedra only."""
+        return self._record.injective
+
+    def _facts(self) -> Facts:
+        return Facts(
+            points=len(self.folded),
+            bodies=len(self.fits),
+            outside=self._record.outside,
+            method=self.options.method,
+            faults=self._record.faults,
+            checked=self.certificate.tetrahedra,
+            epsilon=self.quality.nmd.mean,
+            epsilon_p95=self.quality.nmd.p95,
+            volume=self.quality.volume_unfolded / self.quality.volume_folded,
+            round_trip=self.round_trip_max,
+            seconds=sum(self.seconds.values()),
+            warnings=warnings_of(self._record),
+        )
+
+    def __repr__(self) -> str:
+        """Return one line: points, method, verdict, error and points outside."""
+        return self._facts().line()
+
+    def _repr_html_(self) -> str:
+        """Return verdict, certificate and figures as a small table, for notebooks."""
+        return self._facts().html()
+
+
+def _plain_column(column: pd.Series) -> np.ndarray:
+    """Return a column as VTK can hold it: numbers, truth values as 0 and 1, else texts."""
+    if pd.api.types.is_bool_dtype(column.dtype) and not column.hasnans:
+        return column.to_numpy(dtype=np.uint8)
+    if pd.api.types.is_numeric_dtype(column.dtype):
+        exact = isinstance(column.dtype, np.dtype)
+        return column.to_numpy() if exact else column.to_numpy(np.float64, na_value=np.nan)
+    return column.astype(object).where(column.notna(), "").astype(str).to_numpy(dtype=object)

@@ -1,0 +1,153 @@
+"""Unfold a body: the stages in order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geounfold.backends.blas import one_thread
+from geounfold.body.prepare import prepare
+from geounfold.body.working_frame import Frame
+from geounfold.errors import InputError
+from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
+from geounfold.io.result_columns import frame_points
+from geounfold.mapping.carried import checked_points
+from geounfold.mapping.certificate import certify
+from geounfold.mapping.control_mesh import side_by_side
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.methods import METHODS, BodyFit, PointwiseMap
+from geounfold.unfolding.checks import check_method, check_single
+from geounfold.unfolding.fit_body import fit
+from geounfold.unfolding.measured import measure
+from geounfold.unfolding.options import UnfoldOptions
+from geounfold.unfolding.result import Unfolding
+from geounfold.unfolding.summary import RunRecord
+
+Progress = Callable[[str], None]
+
+
+class _Clock:
+    """Seconds per stage, with the stages' names shown as they start."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress = progress
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        if self._progress is not None:
+            self._progress(name)
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            taken = time.perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + taken
+
+
+@one_thread()
+def unfold(
+    points: Floats | pd.DataFrame,
+    options: UnfoldOptions | None = None,
+    *,
+    top: TriMesh | tuple[Any, Any] | None = None,
+    bottom: TriMesh | tuple[Any, Any] | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Unfolding:
+    """Take the folds out of a body given by its block centroids.
+
+    Parameters
+    ----------
+    points : (n, 3) array or DataFrame
+        Centroids in any length unit and any coordinates; of a DataFrame the coordinate
+        columns are found by name (centroid_x/y/z, x/y/z, XC/YC/ZC, easting/...).
+    options : UnfoldOptions, optional
+        Defaults where not given.
+    top, bottom : TriMesh or (V, F), optional
+        Hanging wall and footwall in the points' coordinates, in place of an extracted hull;
+        both or neither.
+    progress : callable, optional
+        Called with every stage's name as it starts.
+    **changes
+        Fields of UnfoldOptions given by name.
+
+    Returns
+    -------
+    Unfolding
+
+    Raises
+    ------
+    InputError
+        Points that are no body (too few, flat, several bodies, no sheet), or options outside
+        their valid values.
+    HullError, SplitError, FlatteningError, ControlMeshError
+        A stage failed; the message says where and what to try.
+
+    Examples
+    --------
+    >>> import geounfold as gu
+    >>> body = gu.simulate("sim_case_1")
+    >>> u = gu.unfold(body.folded)
+    >>> u.points.shape == body.folded.shape
+    True
+    """
+    chosen = replace(options or UnfoldOptions(), **changes)
+    check_method(chosen)
+    clock = _Clock(progress)
+    with clock.stage("frame"):
+        prepared, bodies = prepare(_coordinates(points), chosen.body)
+        check_single(prepared.groups, chosen)
+    reference = _reference(top, bottom, prepared.frame)
+    fits = [fit(body, prepared.frame, chosen, reference, clock.stage) for body in bodies]
+    del bodies  # as large as the points, and not needed any more
+    with clock.stage("map"):
+        mapping = _one_map(fits, prepared.frame, chosen)
+    measured = measure(mapping, prepared, chosen, clock.stage)
+    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
+    return Unfolding(record, points if isinstance(points, pd.DataFrame) else None)
+
+
+def _coordinates(points: Floats | pd.DataFrame) -> Floats:
+    """Return finite (n, 3) coordinates; of a DataFrame, those of its coordinate columns."""
+    if isinstance(points, pd.DataFrame):
+        points = frame_points(points)
+    return checked_points(points)
+
+
+def _reference(
+    top: TriMesh | tuple[Any, Any] | None, bottom: TriMesh | tuple[Any, Any] | None, frame: Frame
+) -> tuple[TriMesh, TriMesh] | None:
+    if top is None and bottom is None:
+        return None
+    if top is None or bottom is None:
+        raise InputError("top and bottom reference surfaces belong together: give both or neither")
+    upper, lower = (as_trimesh(mesh) for mesh in (top, bottom))
+    return (
+        upper.with_vertices(frame.to_work(upper.V)),
+        lower.with_vertices(frame.to_work(lower.V)),
+    )
+
+
+def _one_map(
+    fits: list[BodyFit], frame: Frame, options: UnfoldOptions
+) -> UnfoldingMap | PointwiseMap:
+    """Return the map of all bodies, without shells where those are in each other's way."""
+    rules = [(f.rule, f.points) for f in fits if f.rule is not None and f.points is not None]
+    if rules:
+        return PointwiseMap(options.method, frame, *rules[0], options.reach)
+    reach = METHODS[options.method].reach
+    meshes = [(f.control, f.shell) for f in fits if f.control is not None]
+    control, shell = side_by_side(meshes)
+    if len(fits) > 1 and shell is not None:
+        none = np.empty(0, np.int64)
+        if not certify(control, shell, none).injective:
+            control, shell = side_by_side([(control, None) for control, _ in meshes])
+    reach = options.reach if reach is None else reach
+    return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates)

@@ -1,0 +1,240 @@
+"""The summary of a run: what ran and how good the answer is, ready for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from geounfold._version import __version__
+from geounfold.backends.igl import boundary_loops, is_manifold
+from geounfold.backends.memory import peak_memory_mb
+from geounfold.body.check import count_duplicates
+from geounfold.body.prepare import PreparedPoints
+from geounfold.flattening import Flattening
+from geounfold.geometry.measures import enclosed_volume, triangle_areas
+from geounfold.geometry.mesh import Floats
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.mapping.prism_coordinates import PrismInterpolant
+from geounfold.methods import BodyFit, PointwiseMap, SurfacePair
+from geounfold.unfolding.measured import Measured
+from geounfold.unfolding.options import UnfoldOptions
+from geounfold.unfolding.options_toml import to_toml
+
+
+@dataclass(frozen=True, eq=False)
+class RunRecord:
+    """Everything that a run made.
+
+    Attributes
+    ----------
+    options : UnfoldOptions
+        As used.
+    prepared : PreparedPoints
+        The points, their lattice and frame, the bodies among them.
+    fits : list of BodyFit
+        The stages of every body, working units.
+    map : UnfoldingMap or PointwiseMap
+        The map of all bodies.
+    measured : Measured
+        Where the points went, what is proved of the map, how good it is.
+    seconds : dict of float
+        Per stage.
+    """
+
+    options: UnfoldOptions
+    prepared: PreparedPoints
+    fits: list[BodyFit]
+    map: UnfoldingMap | PointwiseMap
+    measured: Measured
+    seconds: dict[str, float]
+
+    @property
+    def outside(self) -> int:
+        """Number of points that the control mesh does not hold."""
+        return int((~self.measured.carried.inside).sum())
+
+    @property
+    def empty(self) -> int:
+        """Number of points without an image."""
+        return int((~self.measured.carried.placed).sum())
+
+    @property
+    def lost(self) -> int:
+        """Number of points that were not brought back although the map holds their image."""
+        returned = self.measured.returned
+        return 0 if returned is None else int(returned.lost.sum())
+
+    @property
+    def round_trip_max(self) -> float | None:
+        """Largest distance between a point and its return; None if there is no way back."""
+        returned = self.measured.returned
+        return None if returned is None else returned.largest
+
+    @property
+    def injective(self) -> bool:
+        """Whether the map is proved one-to-one; the certificate covers tetrahedra only."""
+        return self.measured.certificate.injective and self.map.prisms is None
+
+    @property
+    def faults(self) -> list[str]:
+        """Reasons why the map is not proved one-to-one; empty if it is."""
+        certificate = self.measured.certificate
+        faults = [] if certificate.injective else certificate.faults
+        if self.map.prisms is None:
+            return faults
+        return [*faults, f"{self.map.coordinates} coordinates, which no theorem covers"]
+
+
+def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, Any]:
+    """Return the summary of a run; ``surfaces`` are those of its largest body, true to scale."""
+    certificate = run.measured.certificate
+    fit = run.fits[0]
+    return {
+        "version": __version__,
+        "options": run.options.as_dict(),
+        "config": to_toml(run.options),
+        "points": len(run.prepared.points),
+        "bodies": len(run.fits),
+        "lattice": _lattice(run),
+        "seconds": run.seconds,
+        "peak_memory_mb": peak_memory_mb(),
+        "hull": _hull(run),
+        **{name: _surface(pair) for name, pair in surfaces.items()},
+        "flattening": {name: _flattening(found) for name, found in fit.flattenings.items()},
+        "method": fit.notes,
+        "control_mesh": _control(run),
+        "inverted_folded": certificate.inverted_folded,
+        "inverted_unfolded": certificate.inverted_unfolded,
+        "injective": run.injective,
+        "coordinates": _coordinates(run),
+        "certificate": certificate.as_dict(),
+        "outside_share": run.outside / len(run.prepared.points),
+        "outside": _outside(run),
+        "round_trip_max": run.round_trip_max,
+        "torn": len(run.measured.torn),
+        **run.measured.quality.summary(),
+        "warnings": warnings_of(run),
+    }
+
+
+def warnings_of(run: RunRecord) -> list[str]:
+    """Return what a user should know before trusting the answer, one sentence each."""
+    out = []
+    duplicates = count_duplicates(run.prepared.points)
+    if duplicates:
+        out.append(f"{duplicates} points repeat the coordinates of another; all were kept")
+    apart = len(run.prepared.points) - run.prepared.chosen
+    if apart:
+        out.append(
+            f"{apart} points are not part of the unfolded body; they were carried where its "
+            "map reaches them"
+        )
+    count, outside, empty = len(run.prepared.points), run.outside, run.empty
+    if outside > empty:
+        out.append(
+            f"{outside - empty} of {count} points lie outside the control mesh and "
+            "were carried by its continuation; they are marked extrapolated"
+        )
+    if empty:
+        out.append(
+            f"{empty} of {count} points lie farther from the control mesh than the "
+            f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}); they were left empty"
+        )
+    if len(run.measured.torn):
+        out.append(f"{len(run.measured.torn)} blocks were torn from their neighbours")
+    out += [warning for fit in run.fits for warning in fit.warnings]
+    if not run.injective:
+        out.append(f"the map is not proved one-to-one: {', '.join(run.faults)}")
+    if run.lost:
+        out.append(f"{run.lost} points were not brought back by the map")
+    return out
+
+
+def _lattice(run: RunRecord) -> dict[str, Any]:
+    spacing = run.prepared.frame.scale
+    if run.prepared.lattice is None:
+        return {"found": False, "spacing": spacing}
+    return {"found": True, "spacing": spacing, "steps": run.prepared.lattice.steps.tolist()}
+
+
+def _hull(run: RunRecord) -> dict[str, Any]:
+    hull = run.fits[0].hull
+    if hull is None:
+        return {"method": "reference surfaces"}
+    cube = run.prepared.frame.scale**3
+    return {
+        "method": hull.method,
+        "reason": hull.reason,
+        "faces": len(hull.mesh.F),
+        "volume": enclosed_volume(hull.mesh.V, hull.mesh.F) * cube,
+        "blocks_volume": hull.blocks_volume * cube,
+        "closed": not boundary_loops(hull.mesh.F),
+        "manifold": is_manifold(hull.mesh.F),
+        "dropped_faces": hull.dropped,
+    }
+
+
+def _surface(pair: SurfacePair) -> dict[str, Any]:
+    before = triangle_areas(pair.folded.V, pair.folded.F).sum()
+    after = triangle_areas(pair.unfolded.V, pair.unfolded.F).sum()
+    return {"faces": len(pair.folded.F), "area": float(before), "area_unfolded": float(after)}
+
+
+def _control(run: RunRecord) -> dict[str, Any] | None:
+    if isinstance(run.map, PointwiseMap):
+        return None
+    control = run.map.control
+    return {
+        "vertices": len(control.folded.V),
+        "tetrahedra": len(control.folded.T),
+        "volume_folded": run.measured.quality.volume_folded,
+        "volume_unfolded": run.measured.quality.volume_unfolded,
+    }
+
+
+def _coordinates(run: RunRecord) -> dict[str, Any]:
+    prisms = run.map.prisms
+    out: dict[str, Any] = {"name": run.map.coordinates, "proved": run.injective}
+    if prisms is None:
+        return out
+    return {
+        **out,
+        **prisms.counts(),
+        "blocks_in_prisms": _in_prisms(run, prisms),
+        "blocks_inside_out": int((run.measured.quality.blocks.volume_ratio <= 0).sum()),
+        "blocks_not_brought_back": run.lost,
+        "tolerance": prisms.tolerance * run.prepared.frame.scale,
+    }
+
+
+def _in_prisms(run: RunRecord, prisms: PrismInterpolant) -> int:
+    element = run.measured.carried.element[run.measured.carried.placed]
+    return int((prisms.prism[element] >= 0).sum())
+
+
+def _outside(run: RunRecord) -> dict[str, Any]:
+    carried = run.measured.carried
+    return {
+        "extrapolated": int((carried.placed & ~carried.inside).sum()),
+        "empty": int((~carried.placed).sum()),
+        "largest_distance": float(carried.distance.max()),
+        "reach": run.map.reach * run.prepared.frame.scale,
+    }
+
+
+def _flattening(flattening: Flattening) -> dict[str, Any]:
+    def ends(history: Floats) -> list[float]:
+        return [float(history[0]), float(history[-1])] if len(history) else []
+
+    return {
+        "method": flattening.method,
+        "iterations": flattening.iterations,
+        "stop": str(flattening.stop),
+        "energy": ends(flattening.energy),
+        "area_change": ends(flattening.area_error)[-1:],
+        "edge_strain": ends(flattening.edge_error)[-1:],
+        "flips": flattening.flips,
+        "overlaps": flattening.overlaps,
+        "note": flattening.note,
+    }

@@ -1,9 +1,9 @@
-"""Blocks merged into cells, where there are more of them than the sheet's shape needs.
+"""Blocks merged into cells, so that large models cost no more than their shape needs.
 
-Hull, split and sheet follow folds, outline and thickness; on blocks much smaller than those they
-would cost more and say the same.  So the blocks of every ``merge x merge x merge`` places become
-one cell with the share of it that they fill.  The blocks near the body's surface are marked: they
-alone know where it is to a fraction of a block.
+Hull, split and mid surface follow folds, outline and thickness. Blocks much smaller than those
+would cost more and change nothing. So the blocks of every ``merge x merge x merge`` positions
+become one cell with the share of it that they fill. The blocks near the body's surface are marked,
+because they alone locate it to a fraction of a block.
 """
 
 from __future__ import annotations
@@ -13,40 +13,28 @@ from itertools import product
 
 import numpy as np
 
-from geounfold.errors import OptionError
 from geounfold.geometry.mesh import Bools, Floats, Ints
+
+MERGE_ABOVE = 60_000
+"""Number of blocks up to which none are merged."""
+
+LEAST_SURFACE = 12_000.0
+"""Area of the body's surface, in faces of a cell, below which merging does not take it."""
+
+LEAST_LAYERS = 1.0
+"""Thickness of the body, in cells, below which merging does not take it."""
 
 _SLANT = 1.5
 """Mean over all directions of |nx| + |ny| + |nz|: faces of blocks per unit of a smooth surface."""
 
-_DENSE = 8  # places of the cells' box per block up to which they are counted in an array
-_FILLED = 0.5  # least share of an inner cell off a lattice, where blocks per cell vary
-_OFF = np.array([0.3711, 0.6173, 0.1437])  # of a cell: no point of a grid on the cells' borders
+_DENSE = 8  # positions in the cells' box per block, up to which an array of all of them is used
+_FILLED = 0.5  # least share of an inner cell off a lattice, because blocks per cell vary
+_OFF = np.array([0.3711, 0.6173, 0.1437])  # of a cell: no grid point lies on a border of cells
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
-@dataclass(frozen=True, kw_only=True)
-class CoarseOptions:
-    """When and how far blocks are merged.
-
-    ``blocks``: number of blocks up to which none are; ``surface``: least area of the body's
-    surface, and ``layers``: least thickness of the sheet, that merging leaves, in cells.
-    """
-
-    blocks: int = 60_000
-    surface: float = 12_000.0
-    layers: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not (self.blocks >= 1 and self.surface > 0 and self.layers > 0):
-            raise OptionError(
-                "coarse options must be positive, but are "
-                f"blocks {self.blocks}, surface {self.surface}, layers {self.layers}"
-            )
-
-
 @dataclass(frozen=True, eq=False)
-class Coarse:
+class MergedBlocks:
     """A body's blocks merged into cells.
 
     Attributes
@@ -54,13 +42,13 @@ class Coarse:
     merge : int
         Blocks along a cell's side.
     points : (k, 3) float
-        Mean place of the blocks in each cell, in working units divided by ``merge``.
+        Mean position of the blocks in each cell, in working units divided by ``merge``.
     share : (k,) float
-        Share of each cell that they fill; 1 is full.
+        Share of each cell that its blocks fill; 1 is full.
     border : (n,) bool
-        For every block: whether its cell or one of the 26 around it is not full.
+        For every block: whether its cell or one of the 26 around that cell is not full.
     beside : (n,) bool
-        The same, and whether one of those 26 holds border blocks.
+        For every block: whether its cell or one of the 26 around that cell holds border blocks.
     """
 
     merge: int
@@ -70,38 +58,47 @@ class Coarse:
     beside: Bools
 
 
-def merges(points: Floats, steps: Floats | None, options: CoarseOptions) -> tuple[int, ...]:
-    """Return how many blocks to merge along a cell's side: as many as options allow, then fewer.
+def merge_sizes(points: Floats, steps: Floats | None, above: int = MERGE_ABOVE) -> tuple[int, ...]:
+    """Return the numbers of blocks along a cell's side to try, the largest first.
 
-    Empty where none are to be merged.
+    The first is the largest that leaves LEAST_SURFACE and LEAST_LAYERS; each next one is three
+    quarters of the one before. The tuple is empty if no blocks are to be merged.
 
     Parameters
     ----------
     points : (n, 3) float
         Blocks, working units.
     steps : (3,) float or None
-        Block sides, where the blocks lie on a lattice at whole multiples of them.
-    options : CoarseOptions
-        See there.
+        Block sides, if the blocks lie on a lattice at whole multiples of them.
+    above : int
+        Number of blocks up to which none are merged.
     """
-    if len(points) <= options.blocks:
+    if len(points) <= above:
         return ()
-    found, merge = [], _most(points, steps, options)
+    found, merge = [], _largest(points, steps)
     while merge > 1:
         found.append(merge)
         merge = 3 * merge // 4
     return tuple(found)
 
 
-def merged(points: Floats, steps: Floats | None, merge: int) -> Coarse:
-    """Return the blocks merged into cells of ``merge`` blocks a side (see merges)."""
+def merge_blocks(points: Floats, steps: Floats | None, merge: int) -> MergedBlocks:
+    """Return the blocks merged into cells of ``merge`` blocks a side.
+
+    Parameters
+    ----------
+    points, steps
+        As merge_sizes takes them.
+    merge : int
+        Blocks along a cell's side, 2 or more.
+    """
     cells = _Cells.of(_places(points, steps, merge))
     share = cells.count / merge**3
     middle = [np.bincount(cells.row, x) / cells.count / merge for x in points.T]
     full = share >= (_FILLED if steps is None else 1.0)
     inner = cells.least(full.astype(np.float64))
     deep = cells.least(inner)
-    return Coarse(
+    return MergedBlocks(
         merge,
         np.stack(middle, axis=1),
         share,
@@ -110,8 +107,8 @@ def merged(points: Floats, steps: Floats | None, merge: int) -> Coarse:
     )
 
 
-def _most(points: Floats, steps: Floats | None, options: CoarseOptions) -> int:
-    """Return the most blocks to merge along a side, 1 for none.
+def _largest(points: Floats, steps: Floats | None) -> int:
+    """Return the largest number of blocks to merge along a side; 1 merges none.
 
     Surface and thickness are measured on cells of two blocks a side.
     """
@@ -119,8 +116,8 @@ def _most(points: Floats, steps: Floats | None, options: CoarseOptions) -> int:
     sides = np.ones(3) if steps is None else steps
     area = 4 * cells.area(cells.count / 8, 1 / sides) / _SLANT
     thickness = 2 * len(points) / area
-    wanted = np.ceil(np.sqrt(area / options.surface))
-    return int(max(1, min(wanted, thickness // options.layers)))
+    wanted = np.ceil(np.sqrt(area / LEAST_SURFACE))
+    return int(max(1, min(wanted, thickness // LEAST_LAYERS)))
 
 
 def _places(points: Floats, steps: Floats | None, merge: int) -> Ints:

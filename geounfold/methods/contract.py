@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from geounfold.body.merged_blocks import Coarse
+from geounfold.body.merged_blocks import MergedBlocks
 from geounfold.body.working_frame import Frame
 from geounfold.flattening import Flattening, flatten
 from geounfold.geometry.measures import face_normals, triangle_areas
@@ -58,7 +58,7 @@ class PreparedBody:
         How reference surfaces are fitted.
     stage : callable
         See Stage.
-    coarse : Coarse or None
+    coarse : MergedBlocks or None
         The points merged into cells, where they are many; hull and split are in its unit then.
     """
 
@@ -74,7 +74,7 @@ class PreparedBody:
     options: Any
     sheet_options: SheetOptions
     stage: Stage
-    coarse: Coarse | None = None
+    coarse: MergedBlocks | None = None
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
         """Lay a surface flat by the chosen flattener, as the answer comes."""

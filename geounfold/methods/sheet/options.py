@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from geounfold.body.merged_blocks import CoarseOptions
+from geounfold.body.merged_blocks import MERGE_ABOVE
+from geounfold.errors import OptionError
 from geounfold.methods.sheet.meshing.build import ControlOptions
 from geounfold.methods.sheet.meshing.top_and_bottom import HorizonOptions
 from geounfold.methods.sheet.mid_surface.fit import CloserFitOptions, FitOptions
@@ -26,7 +27,8 @@ class SheetOptions:
     ``refused_agree``, where it explains ``refused_share`` of the hull and lattice sites agree
     with it.  ``closer``: how the sheet is fitted where they agree with neither, or, of points on
     no lattice, where they lie ``left_out`` blocks and more beyond it on average; ``sheared``:
-    see OccupancyOptions, of the sheet so fitted.
+    see OccupancyOptions, of the sheet so fitted.  ``merge_above``: number of blocks up to which
+    none are merged into larger cells.
     """
 
     medial: MedialOptions = field(default_factory=MedialOptions)
@@ -36,7 +38,6 @@ class SheetOptions:
     layers: LayerOptions = field(default_factory=LayerOptions)
     conform: ConformOptions = field(default_factory=ConformOptions)
     control: ControlOptions = field(default_factory=ControlOptions)
-    coarse: CoarseOptions = field(default_factory=CoarseOptions)
     closer: CloserFitOptions = field(default_factory=CloserFitOptions)
     left_out: float = 0.008
     sheared: float = 1.0
@@ -46,3 +47,8 @@ class SheetOptions:
     tapering: float = 0.1
     taper_half: float = 4.5
     taper_gain: float = 1.4
+    merge_above: int = MERGE_ABOVE
+
+    def __post_init__(self) -> None:
+        if self.merge_above < 1:
+            raise OptionError(f"merge_above must be 1 or more blocks, but is {self.merge_above}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geounfold.body.merged_blocks import Coarse
+from geounfold.body.merged_blocks import MergedBlocks
 from geounfold.errors import ControlMeshError, SplitError
 from geounfold.flattening import SpringOptions
 from geounfold.flattening import flatten as flatten_surface
@@ -74,7 +74,7 @@ def fit_body(
     options: SheetOptions,
     datum: str = "mid",
     exact: bool = False,
-    coarse: Coarse | None = None,
+    coarse: MergedBlocks | None = None,
 ) -> SheetResult:
     """Return the control mesh of a split body by the sheet method, and what led to it.
 
@@ -102,7 +102,7 @@ def fit_body(
         Which surface is flat: mid, top, bottom or proportional.
     exact : bool
         The faces are the horizons themselves (reference surfaces): blocks do not correct them.
-    coarse : Coarse, optional
+    coarse : MergedBlocks, optional
         The points merged into cells, which the hull was made of; its unit is a cell's side.
 
     Raises
@@ -176,7 +176,7 @@ def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
     return flatten_surface(mesh, "spring", start=start, options=_LOOSE_SPRINGS, repair=False).uv
 
 
-def _sites(points: Floats, steps: Floats, coarse: Coarse | None) -> Sites:
+def _sites(points: Floats, steps: Floats, coarse: MergedBlocks | None) -> Sites:
     """Return the lattice sites at the surface of the points' body."""
     if coarse is None:
         return surface_sites(np.rint(points / steps).astype(np.int64), steps)

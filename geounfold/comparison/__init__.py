@@ -1,1 +1,1 @@
-"""Comparisons: flatteners of one surface, methods of one body, meshers of one border."""
+"""Comparisons: flatteners of a surface, methods of unfolding a body, meshers of a border."""

@@ -1,4 +1,4 @@
-"""Every flattener on the same surfaces, or every method on the same bodies: one tidy table."""
+"""Compare flatteners on the same surfaces; `compare` also leads to the comparison of methods."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 import pandas as pd
 
 from geounfold.comparison.methods import Blocks, compare_methods
+from geounfold.comparison.names import flattener_names
 from geounfold.errors import GeounfoldError, OptionError
-from geounfold.flattening import FLATTENERS, Flattening, flatten, measures
+from geounfold.flattening import Flattening, flatten, measures
 from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
 from geounfold.synthetic import Body
 from geounfold.unfolding.options import UnfoldOptions
@@ -19,7 +20,6 @@ from geounfold.unfolding.run import Progress, unfold
 
 Surface = TriMesh | tuple[Floats, Ints]
 
-#: Columns of the table, in order.
 COLUMNS = (
     "surface",
     "flattener",
@@ -38,9 +38,9 @@ COLUMNS = (
     "note",
     "error",
 )
+"""Columns of the table of flatteners, in order."""
 
-
-_ORDER = ("top", "bottom", "mid")
+_ORDER = ("top", "bottom", "mid")  # of a body's surfaces in the table
 
 
 def compare(
@@ -53,47 +53,47 @@ def compare(
     unfolding: UnfoldOptions | None = None,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
-    """Flatten surfaces by several flatteners, or unfold bodies by several methods, and measure.
+    """Compare flatteners on the same surfaces, or methods of unfolding on the same bodies.
 
     Parameters
     ----------
     points_or_mesh : (n, 3) array, DataFrame, simulated Body, TriMesh, (V, F) or a mapping
-        A body given by its block centroids, whose top, bottom and mid surface are compared; or
-        what to flatten, where a single surface is named ``surface``.  A tuple is a (V, F) pair.
-        A mapping holds surfaces by their names or, with ``methods``, bodies.
+        Block centroids of a body, whose top, bottom and mid surface are flattened; or one surface
+        (named ``surface`` in the table); or a mapping of names to surfaces.  With ``methods``, a
+        body or a mapping of names to bodies.
     flatteners : str or names, optional
-        ``all`` (those that are free software throughout; the default for surfaces), one name of
-        FLATTENERS or several.  With ``methods`` the default is the one in ``unfolding``.
+        ``all`` (those that are free software throughout), one name of FLATTENERS or several.
+        Default: ``all`` for surfaces; with ``methods``, the flattener of ``unfolding``.
     options : mapping, optional
-        Options of some flatteners, by their names; for surfaces alone.
+        Options of flatteners, by the flattener's name; only for surfaces.
     methods : str or names, optional
-        ``all``, one name of METHODS or several: whole bodies are compared, see
-        ``contest.compare_methods`` for this table.
+        ``all``, one name of METHODS or several.  If given, bodies are compared, and the table is
+        that of `comparison.methods.compare_methods`.
     truth : (n, 3) array or mapping, optional
-        With ``methods``: where the blocks truly lay.
+        With ``methods``: the true unfolded position of each block.
     unfolding : UnfoldOptions, optional
-        How the body's surfaces are found; defaults without.  An uncertified control mesh is no
-        obstacle, since surfaces alone are needed.
+        Options by which the body's surfaces are found.  An uncertified control mesh is accepted,
+        since only the surfaces are needed.
     progress : callable, optional
-        Called with every stage's name as it starts.
+        Called with the name of each stage when it starts.
 
     Returns
     -------
     DataFrame
-        One row per surface and flattener, with the columns of COLUMNS: ``area_error`` is E_s and
-        ``edge_strain`` a root mean square; ``area_distortion`` and ``angle_distortion`` are 1 and
-        ``symmetric_dirichlet`` is 4 for an isometry (inf with a flipped triangle); ``overlaps``
-        counts the pairs of border edges whose images meet; ``seconds`` is wall time.  A method
-        that failed, or whose answer is not one-to-one and cannot be repaired, is a row without
-        figures, and ``error`` says why.
+        One row per surface and flattener, with the columns of COLUMNS.  ``area_error`` is E_s and
+        ``edge_strain`` a root mean square.  For an isometry ``area_distortion`` and
+        ``angle_distortion`` are 1 and ``symmetric_dirichlet`` is 4 (inf if a triangle is flipped).
+        ``overlaps`` counts pairs of border edges whose images intersect; ``seconds`` is wall time.
+        If a flattener fails, or its result is not one-to-one and cannot be repaired, its row has
+        no figures and ``error`` gives the reason.
 
     Raises
     ------
     OptionError
-        A flattener or a method that does not exist, options of unfolding where surfaces are
-        given, a truth without methods, or surfaces or flatteners' options with them.
+        A flattener or method that does not exist; options of unfolding with given surfaces; a
+        truth without ``methods``; surfaces or flatteners' options with ``methods``.
     InputError
-        Points that are no body; see ``unfold``.
+        Points that form no body; see ``unfold``.
 
     Examples
     --------
@@ -110,9 +110,9 @@ def compare(
         )
     if truth is not None:
         raise OptionError("a truth is compared with unfolded blocks: choose methods")
-    names = _names("all" if flatteners is None else flatteners)
+    names = flattener_names("all" if flatteners is None else flatteners)
     if options is not None:
-        _names(options)
+        flattener_names(options)
     rows = []
     for label, mesh in _surfaces(points_or_mesh, unfolding, progress).items():
         for name in names:
@@ -124,9 +124,11 @@ def compare(
 
 
 def _bodies(given: Any, options: Mapping[str, Any] | None) -> Blocks | Mapping[str, Blocks]:
-    """Return bodies as they were given, or raise OptionError where they are surfaces."""
+    """Return the bodies given; raise OptionError if they are surfaces."""
     if options is not None:
-        raise OptionError("flatteners' options are for surfaces; leave them out with methods")
+        raise OptionError(
+            "options of flatteners apply to surfaces only: leave them out with methods"
+        )
     for one in given.values() if isinstance(given, Mapping) else [given]:
         if isinstance(one, TriMesh | tuple):
             raise OptionError("methods unfold whole bodies: give their points, not a surface")
@@ -139,7 +141,7 @@ def _surfaces(
     unfolding: UnfoldOptions | None,
     progress: Progress | None,
 ) -> Mapping[str, Surface]:
-    """Return named surfaces: those given, or top, bottom and mid of the body given."""
+    """Return surfaces by name: those given, or top, bottom and mid of the body given."""
     if isinstance(given, TriMesh | tuple):
         given = {"surface": given}
     if not isinstance(given, Mapping):
@@ -151,18 +153,6 @@ def _surfaces(
         raise OptionError("options of unfolding need a body's points, but surfaces are given")
     surfaces: Mapping[str, Surface] = given
     return surfaces
-
-
-def _names(flatteners: str | Iterable[str]) -> list[str]:
-    """Return the names of flatteners, each of them known."""
-    if flatteners == "all":
-        return [name for name, flattener in FLATTENERS.items() if flattener.free]
-    names = [flatteners] if isinstance(flatteners, str) else list(flatteners)
-    unknown = [name for name in names if name not in FLATTENERS]
-    if unknown or not names:
-        given = ", ".join(unknown) or "none"
-        raise OptionError(f"unknown flatteners: {given}; choose from {', '.join(FLATTENERS)}, all")
-    return names
 
 
 def _row(label: str, mesh: TriMesh, name: str, options: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Methods of whole bodies on the same bodies: one tidy table."""
+"""Compare methods of unfolding on the same bodies."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from geounfold.backends.igl import boundary_loops
+from geounfold.comparison.names import flattener_names, method_names
 from geounfold.errors import GeounfoldError, InputError, OptionError
-from geounfold.flattening import FLATTENERS, measures
+from geounfold.flattening import measures
 from geounfold.flattening._border import border_of
 from geounfold.geometry.mesh import Floats
 from geounfold.mapping.carried import checked_points
@@ -26,7 +27,6 @@ from geounfold.unfolding.run import Progress, unfold
 
 Blocks = Floats | pd.DataFrame | Body
 
-#: Columns of the table of methods, in order.
 METHOD_COLUMNS = (
     *("body", "method", "flattener", "blocks"),
     *("epsilon_folded", "epsilon_truth", "epsilon_nothing", "rms", "rms_nothing"),
@@ -35,6 +35,8 @@ METHOD_COLUMNS = (
     *("symmetric_dirichlet", "flips", "overlaps", "iterations", "seconds", "cpu_seconds"),
     *("note", "error"),
 )
+"""Columns of the table of methods, in order."""
+
 _COUNTS = ("blocks", "torn", "unplaced", "extrapolated", "flips", "overlaps", "iterations")
 
 
@@ -47,54 +49,50 @@ def compare_methods(
     unfolding: UnfoldOptions | None = None,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
-    """Unfold bodies by several methods and measure what came of them.
+    """Unfold bodies by several methods and measure each result.
 
     Parameters
     ----------
     bodies : (n, 3) array, DataFrame, simulated Body, or a mapping of names to these
-        Block centroids; one without a name is called ``body``, or by a simulated body's name.
+        Block centroids.  A single body is called ``body``; a simulated one has its own name.
     methods : str or names
         ``all``, one name of METHODS or several.
     flatteners : str or names, optional
-        ``all``, one name of FLATTENERS or several, for the methods that lay a surface flat; the
-        others have one row.  Default: the flattener of ``unfolding``.
+        ``all``, one name of FLATTENERS or several, for methods that flatten a surface; the other
+        methods have one row.  Default: the flattener of ``unfolding``.
     truth : (n, 3) array or a mapping of names to these, optional
-        Where the blocks truly lay, row by row; simulated bodies know theirs.
+        True unfolded position of each block, row by row; simulated bodies bring their own.
     unfolding : UnfoldOptions, optional
-        Options of all runs; their method and flattener change, and unproved answers are taken.
+        Options of all runs.  Each run sets its method and flattener and accepts an unproved map.
     progress : callable, optional
-        Called with every stage's name as it starts.
+        Called with the name of each stage when it starts.
 
     Returns
     -------
     DataFrame
         One row per body, method and flattener, with the columns of METHOD_COLUMNS.
 
-        ``epsilon_folded`` is the mean of epsilon(X, Y); with a truth, ``epsilon_truth`` is that of
-        epsilon(W, Y) and ``rms`` the distance from W after the best proper motion, in the edge of
-        a mean block; ``epsilon_nothing`` and ``rms_nothing`` are those of leaving the blocks where
-        they are.  ``stratigraphic_error`` is the mean error of the stratigraphic coordinate, for
-        simulated bodies.  ``torn`` blocks lost a neighbour, ``unplaced`` ones have no image (and
-        do not count in the figures before), ``extrapolated`` ones lie where the map was continued.
+        ``epsilon_folded`` is the mean of epsilon(X, Y).  With a truth W, ``epsilon_truth`` is the
+        mean of epsilon(W, Y), and ``rms`` is the distance from W after the best rotation and
+        translation, in edges of a mean block.  ``epsilon_nothing`` and ``rms_nothing`` are the
+        same figures for the folded body itself.  ``stratigraphic_error`` is the mean error of the
+        stratigraphic coordinate (simulated bodies only).  ``torn`` counts blocks that lost a
+        neighbour, ``extrapolated`` those outside the control mesh, and ``unplaced`` those without
+        an image, which are left out of the figures above.
 
         The distortion (``area_error``, the thesis's E_s, to ``overlaps``) is that of one surface
-        of the body as the method carried it, seen from above: the mid surface, or the top where
-        there is none.  ``iterations`` are the steps of all that was minimised; ``seconds`` is wall
-        time.  A method that failed is a row without figures, and ``error`` says why.
+        as the method maps it, seen from above: the mid surface, or the top if the method has no
+        mid surface.  ``iterations`` sums the steps of all minimisations; ``seconds`` is wall time.
+        If a method fails, its row has no figures and ``error`` gives the reason.
 
     Raises
     ------
     OptionError
-        A method or a flattener that does not exist, or a body without a truth of its length.
+        A method or flattener that does not exist, or a truth whose length is not its body's.
     """
     how = unfolding or UnfoldOptions()
-    names = _names("methods", methods, list(METHODS), list(METHODS))
-    free = [name for name, flattener in FLATTENERS.items() if flattener.free]
-    flat = (
-        [how.flattener]
-        if flatteners is None
-        else _names("flatteners", flatteners, list(FLATTENERS), free)
-    )
+    names = method_names(methods)
+    flat = [how.flattener] if flatteners is None else flattener_names(flatteners)
     named = _named(bodies)
     truths = _truths(named, truth)
     rows = []
@@ -110,19 +108,8 @@ def compare_methods(
     return table.astype(kinds)
 
 
-def _names(kind: str, given: str | Iterable[str], valid: list[str], every: list[str]) -> list[str]:
-    """Return names, each of them valid."""
-    if given == "all":
-        return every
-    names = [given] if isinstance(given, str) else list(given)
-    unknown = [name for name in names if name not in valid]
-    if unknown or not names:
-        words = ", ".join(unknown) or "none"
-        raise OptionError(f"unknown {kind}: {words}; choose from {', '.join(valid)}, all")
-    return names
-
-
 def _named(bodies: Blocks | Mapping[str, Blocks]) -> Mapping[str, Blocks]:
+    """Return bodies by name."""
     if isinstance(bodies, Mapping):
         return bodies
     return {bodies.name if isinstance(bodies, Body) else "body": bodies}
@@ -131,7 +118,7 @@ def _named(bodies: Blocks | Mapping[str, Blocks]) -> Mapping[str, Blocks]:
 def _truths(
     named: Mapping[str, Blocks], truth: Floats | Mapping[str, Floats] | None
 ) -> dict[str, Floats]:
-    """Return the truths there are, each of its body's length."""
+    """Return the truths by body, each checked to have its body's length."""
     out = {name: body.truth for name, body in named.items() if isinstance(body, Body)}
     if truth is not None and not isinstance(truth, Mapping):
         if len(named) != 1:
@@ -170,18 +157,19 @@ def _row(
     try:
         u = unfold(points, options, progress=progress)
         row |= _since(clocks)
-        return {**row, **_of_blocks(u, truth, simulated), **_of_surface(u)}
+        return {**row, **_block_figures(u, truth, simulated), **_surface_figures(u)}
     except GeounfoldError as error:
         return {**_since(clocks), **row, "error": f"{error}"}
 
 
 def _since(clocks: tuple[float, float]) -> dict[str, float]:
+    """Return the wall and processor time passed since both clocks were read."""
     wall, cpu = time.perf_counter() - clocks[0], time.process_time() - clocks[1]
     return {"seconds": wall, "cpu_seconds": cpu}
 
 
-def _of_blocks(u: Unfolding, truth: Floats | None, body: Body | None) -> dict[str, Any]:
-    """Return the figures of the blocks, over those that have an image."""
+def _block_figures(u: Unfolding, truth: Floats | None, body: Body | None) -> dict[str, Any]:
+    """Return the figures of the blocks that have an image."""
     there = np.asarray(u.carried.placed, dtype=bool)
     X, Y = u.folded[there], u.points[there]
     iterations = sum(f.iterations for fit in u.fits for f in fit.flattenings.values())
@@ -209,14 +197,16 @@ def _of_blocks(u: Unfolding, truth: Floats | None, body: Body | None) -> dict[st
     return out
 
 
-def _of_surface(u: Unfolding) -> dict[str, Any]:
-    """Return what the map did to the mid surface (the top, where there is none)."""
+def _surface_figures(u: Unfolding) -> dict[str, Any]:
+    """Return the distortion of the mid surface, or of the top if there is no mid surface."""
     pair: SurfacePair = u.surfaces.get("mid", u.surfaces["top"])
     V, F, uv = pair.folded.V, pair.folded.F, np.ascontiguousarray(pair.unfolded.V[:, :2])
     if not len(F):
         raise InputError("no part of the reference surface has an image")
     a, b = uv[F[:, 1]] - uv[F[:, 0]], uv[F[:, 2]] - uv[F[:, 0]]
-    if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() < 0:  # turned over with its body
+    if (
+        a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    ).sum() < 0:  # the surface was turned over with its body
         F = np.ascontiguousarray(F[:, ::-1])
     return {
         "area_error": measures.area_error(V, F, uv),

@@ -1,11 +1,16 @@
-"""How good an unfolding is: neighbour distances, distortion, and distance from a truth.
+"""Quality of an unfolding: neighbour distances, distortion, and distance from a truth.
 
-The thesis's measure (NMD and epsilon, equations 2.2 to 2.5) is nearly blind to folds: a body left
-as it is scores 0 against itself and less than many real unfoldings against the truth.  It is
-therefore given together with what doing nothing would score, and with measures that see folds.
+`neighbour_distances` holds the thesis's measure (NMD and epsilon, equations 2.2 to 2.5), which
+`lattice_neighbours` computes faster for blocks on a lattice.  `blocks` holds the distortion of
+every block, `truth` the comparison with a known truth, `torn_blocks` the blocks that were separated
+from a neighbour.
 
-All lengths are in the unit of the points given; ratios are unfolded over folded (or answer over
-truth), so that 1 is no change.
+The thesis's measure hardly detects folds: a body left folded has epsilon 0 against itself, and
+less than many real unfoldings against the truth.  Epsilon is therefore given beside epsilon of the
+folded body itself, and beside measures that do detect folds.
+
+All lengths are in the unit of the points given.  Ratios are unfolded over folded, or answer over
+truth, so 1 means no change.
 """
 
 from geounfold.quality.blocks import (

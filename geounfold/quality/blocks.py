@@ -1,4 +1,4 @@
-"""Distortion of every block, and the quality of a whole unfolding."""
+"""Distortion of each block, and statistics of it over an unfolding."""
 
 from __future__ import annotations
 
@@ -23,21 +23,19 @@ from geounfold.quality.statistics import Statistics
 from geounfold.quality.truth import distance_ratios
 
 _SIDES = 6  # neighbours that share a face with a block of a lattice
-
-
-_PLANE = 1e-9  # of the largest variance: less than this across a plane is none
+_PLANE = 1e-9  # share of the largest variance below which neighbours count as lying in a plane
 
 
 @dataclass(frozen=True, eq=False)
 class BlockQuality:
-    """Distortion at each block, (n,) each: the columns of the unfolded table.
+    """Distortion at each block: columns of the unfolded table.
 
     Attributes
     ----------
     volume_ratio, stretch_min, stretch_max, shear : (n,) float
-        Of the tetrahedron or prism that carried the block, there (see Distortion).
+        Of the deformation at the block (`mapping.distortion.Distortion`).
     nmd_error : (n,) float
-        epsilon(X, Y) of the block (see `epsilon`).
+        epsilon(X, Y) of the block (`epsilon`).
     """
 
     volume_ratio: Floats
@@ -47,7 +45,7 @@ class BlockQuality:
     shear: Floats
 
     def columns(self) -> dict[str, Floats]:
-        """Return the columns by name, in the order in which tables have them."""
+        """Return the columns by name, in the order of the table."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
@@ -67,23 +65,23 @@ def block_quality(
     control : ControlMesh
         The map.
     elements : (n,) int
-        The tetrahedron that carried each block; -1 for a block without an image, whose figures
-        are NaN and which is no other block's neighbour.
+        The tetrahedron that maps each block; -1 for a block without an image.  Such a block has
+        NaN figures and is not counted as a neighbour.
     folded, unfolded : (n, 3) float
         The blocks in both spaces, in the same unit.
     k : int
-        Number of neighbours of epsilon.
+        Number of neighbours for epsilon.
     gradients : (p, 3, 3) float, optional
         Deformation gradients at the p blocks that have an image; by default their tetrahedra's.
     lattice : ((n, 3) int, (3,) float), optional
-        Lattice cell of each block, and the cells' sides: see `lattice_epsilon`.
+        Lattice cell of each block and the cells' sides, for `lattice_epsilon`.
 
     Raises
     ------
     InputError
-        Shapes that do not agree, or a row of `elements` that names no tetrahedron.
+        Shapes do not agree, or `elements` holds a number that is not a tetrahedron's.
     ControlMeshError
-        A tetrahedron that carries blocks has no volume, or no thickness when unfolded.
+        A tetrahedron that maps blocks has no volume, or no thickness when unfolded.
     """
     rows = np.asarray(elements)
     count = len(control.folded.T)
@@ -91,7 +89,7 @@ def block_quality(
         raise InputError(f"elements must have shape ({len(folded)},), but have {rows.shape}")
     if rows.size and not -1 <= rows.min() <= rows.max() < count:
         raise InputError(
-            f"elements name {rows.min()}..{rows.max()}, but there are {count} tetrahedra"
+            f"elements must be -1 to {count - 1}, but are {rows.min()} to {rows.max()}"
         )
     placed = rows >= 0
     some = slice(None) if placed.all() else placed
@@ -126,14 +124,14 @@ def block_quality(
 
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """How good an unfolding is, without a truth.
+    """Quality of an unfolding, measured without a truth.
 
     Attributes
     ----------
     blocks : BlockQuality
         Distortion at each block.
     nmd : Statistics
-        epsilon(X, Y) over the blocks; doing nothing scores 0.
+        epsilon(X, Y) over the blocks; 0 for the folded body itself.
     shear : Statistics
         Layer-parallel shear over the blocks.
     volume_change : Statistics
@@ -143,8 +141,8 @@ class Quality:
     volume_folded, volume_unfolded : float
         Signed volume of the control mesh in both spaces.
     inverted_folded, inverted_unfolded : int
-        Tetrahedra whose volume is not positive; for a map without a control mesh, blocks whose
-        neighbours' images are turned inside out.
+        Tetrahedra whose volume is not positive.  For a map without a control mesh: 0, and the
+        number of blocks whose deformation gradient has a determinant that is not positive.
     """
 
     blocks: BlockQuality
@@ -158,10 +156,10 @@ class Quality:
     inverted_unfolded: int
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures as plain dicts and numbers, without the blocks' columns.
+        """Return the figures as plain dicts and numbers, without the columns of blocks.
 
-        ``nmd`` also tells over how many blocks it is taken (``sample``): all that have an image,
-        so that its mean has no ``standard_error`` of sampling.
+        ``nmd`` also has the number of blocks it is taken over (``sample``).  These are all blocks
+        with an image, so the sampling error of its mean (``standard_error``) is 0.
         """
         out = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "blocks"}
         plain = {k: asdict(v) if isinstance(v, Statistics) else v for k, v in out.items()}
@@ -189,9 +187,14 @@ def assess(
     control : ControlMesh
         The body's tetrahedra.
     whole : ControlMesh
-        Those and the shell around them, which ``elements`` name.
+        The body's tetrahedra and the shell around them; ``elements`` are numbers of these.
     elements, folded, unfolded, k, gradients, lattice
-        As for `block_quality`, errors too.
+        As for `block_quality`.
+
+    Raises
+    ------
+    InputError, ControlMeshError
+        As for `block_quality`.
     """
     blocks = block_quality(whole, elements, folded, unfolded, k, gradients, lattice)
     placed = np.asarray(elements) >= 0
@@ -211,27 +214,27 @@ def assess(
 
 
 def assess_points(folded: Floats, unfolded: Floats, volume: float, k: int = NEIGHBOURS) -> Quality:
-    """Return the quality of an unfolding without a control mesh, by each block's neighbours.
+    """Return the quality of an unfolding without a control mesh, from each block's neighbours.
 
-    The deformation gradient at a block is the linear map that takes the offsets of its k
-    neighbours nearest to their images, in the least squares.
+    The deformation gradient at a block is the least-squares linear map from the offsets of its k
+    neighbours to the offsets of their images.
 
     Parameters
     ----------
     folded, unfolded : (n, 3) float
-        The blocks in both spaces, in the same unit; those without an image are NaN when unfolded,
-        have NaN figures and are no other block's neighbours.
+        The blocks in both spaces, in the same unit.  A block without an image is NaN when
+        unfolded, has NaN figures and is not counted as a neighbour.
     volume : float
-        Of one block.
+        Volume of a block.
     k : int
         Number of neighbours.
 
     Raises
     ------
     InputError
-        Too few points with an image.
+        There are too few points with an image.
     ControlMeshError
-        Neighbours that lie in one plane across the layers when unfolded.
+        A block's neighbours lie in one plane across the layers when unfolded.
     """
     placed = np.isfinite(unfolded).all(axis=1)
     X, Y = folded[placed], unfolded[placed]
@@ -265,16 +268,17 @@ def assess_points(folded: Floats, unfolded: Floats, volume: float, k: int = NEIG
 
 
 def neighbour_gradients(X: Floats, Y: Floats, ids: Ints) -> Floats:
-    """Return the linear map (n, 3, 3) of each point's neighbourhood, in the least squares.
+    """Return the least-squares linear map of each point's neighbourhood, (n, 3, 3).
 
-    Where the neighbours lie in a plane, the plane's normal is taken to its image's unit normal.
+    If a point's neighbours lie in a plane, the map takes the plane's unit normal to the unit
+    normal of its image.
 
     Parameters
     ----------
     X, Y : (n, 3) float
         Points in both spaces.
     ids : (n, k) int
-        Each point's neighbours.
+        Rows of each point's neighbours.
     """
     C, D = np.empty((len(X), 3, 3)), np.empty((len(X), 3, 3))
     for start in range(0, len(X), CACHED):

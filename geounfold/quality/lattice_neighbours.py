@@ -1,12 +1,13 @@
-"""Neighbours of blocks on a lattice, by counting cells instead of searching a tree.
+"""Neighbours of blocks on a lattice, found by cell number instead of by a search tree.
 
-A block's nearest neighbours are the occupied cells at the shortest offsets.  The offsets are put in
-order once, equally long ones together; most blocks have their neighbours at the first of them, and
-those at the body's surface go on along the list.  Where more blocks are equally near than there is
-room for among the k nearest, their mean counts for each: nothing depends on which would be taken.
+A block's nearest neighbours are the occupied cells at the shortest offsets.  The offsets are sorted
+once by length into shells of equal length.  Most blocks find all their neighbours in the first
+shells; blocks at the body's surface need further ones.  If a shell holds more blocks than there is
+room for among the k nearest, the mean over the shell counts, so the answer does not depend on which
+of them would be taken.
 
-Blocks are taken in the order of their cells, some thousands at a time, each time with a table of
-the cells around those alone: memory does not grow with the body.
+Blocks are processed in the order of their cells, some thousands at a time, with a table of only the
+cells around them, so memory does not grow with the body.
 """
 
 from __future__ import annotations
@@ -19,30 +20,32 @@ from geounfold.backends.threads import over_slices
 from geounfold.geometry.measures import lengths_between
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers
 
-_OFFSETS = 640  # tried for a block; one on a sheet of one block's edge needs some 110 for 26
-_SLICE = 1 << 14  # blocks at once
-_WINDOW = 1 << 26  # cells in a table, at most: 256 MB
+_OFFSETS = 640  # offsets tried; 26 neighbours at the edge of a sheet one block thick need some 110
+_SLICE = 1 << 14  # blocks processed at once
+_WINDOW = 1 << 26  # cells of a table at most: 256 MB
 
 
 def offsets_by_length(sides: Floats, count: int = _OFFSETS) -> list[Ints]:
-    """Return the ``count`` shortest offsets between lattice cells, shortest first, or a few more.
+    """Return the shortest offsets between lattice cells, in shells of equal length.
 
     Parameters
     ----------
     sides : (3,) float
         Sides of a cell.
+    count : int
+        Number of offsets; the last shell is kept whole, so there may be a few more.
 
     Returns
     -------
     list of (s, 3) int
-        Those of one length together.
+        The shells, shortest first.
 
     Examples
     --------
     >>> [o.tolist() for o in offsets_by_length(np.array([1.0, 2.0, 0.5]), 3)]
     [[[0, 0, -1], [0, 0, 1]], [[-1, 0, 0], [0, 0, -2], [0, 0, 2], [1, 0, 0]]]
     """
-    radius = float(np.cbrt(count * np.prod(sides)))  # a ball of it holds 4.2 times so many
+    radius = float(np.cbrt(count * np.prod(sides)))  # a ball of this radius holds 4.2 * count
     reach = np.ceil(radius / sides).astype(np.int64)
     every = np.array([o for o in product(*(range(-r, r + 1) for r in reach)) if any(o)])
     square = np.round(((every * sides) ** 2).sum(axis=1) / radius**2, 9)
@@ -58,13 +61,13 @@ def lattice_nmd(
 ) -> tuple[Floats, ...] | None:
     """Return the mean distance to the k nearest neighbours on a lattice, in several spaces.
 
-    Neighbours are the nearest by their cells: neither the order of the rows nor rounding of the
-    coordinates changes them.
+    Neighbours are found by cell, so neither the order of the rows nor rounding of the coordinates
+    changes them.
 
     Parameters
     ----------
     cells : (n, 3) int
-        Lattice cell of every block, all different.
+        Lattice cell of each block; no two blocks share one.
     sides : (3,) float
         Sides of a cell.
     clouds : tuple of (n, 3) float
@@ -75,8 +78,9 @@ def lattice_nmd(
     Returns
     -------
     tuple of (n,) float, or None
-        In the unit of each cloud; NaN for a block that has fewer than k neighbours at the
-        offsets tried.  None where two blocks share a cell, or the body is too sparse in its box.
+        In the unit of each cloud; NaN for a block with fewer than k neighbours at the offsets
+        tried.  None if two blocks share a cell, or if the body fills too little of its bounding
+        box for a table.
     """
     shells = offsets_by_length(sides)
     offsets = np.concatenate(shells)
@@ -84,7 +88,7 @@ def lattice_nmd(
         return None
     low = cells.min(axis=0) - np.abs(offsets).max(axis=0)
     shape = cells.max(axis=0) + np.abs(offsets).max(axis=0) - low + 1
-    turn = np.argsort(-shape, kind="stable")  # the longest axis is the slowest: narrow windows
+    turn = np.argsort(-shape, kind="stable")  # the longest axis varies slowest: narrow windows
     cells, shape, low = cells[:, turn], shape[turn], low[turn]
     if float(np.prod(shape.astype(float))) > 2.0**62:
         return None
@@ -121,7 +125,21 @@ def lattice_nmd(
 def _means(
     table: Numbers, at: Ints, steps: list[Ints], near: list[list[Floats]], k: int
 ) -> list[Floats]:
-    """Return the mean distance of the blocks at places of a table of rows, (m,) per space."""
+    """Return the mean distances of the blocks at some table positions, (m,) per space.
+
+    Parameters
+    ----------
+    table : (t,) int
+        Row of the block in each cell; -1 for an empty cell.
+    at : (m,) int
+        Table positions of the blocks.
+    steps : list of (s,) int
+        Shells of offsets, as differences of table positions.
+    near : list of lists of (r,) float
+        For each space, the three coordinates of the table's rows.
+    k : int
+        Number of neighbours.
+    """
     own = table[at]
     here = [[c[own] for c in cloud] for cloud in near]
     sums = [np.zeros(len(at)) for _ in near]

@@ -1,4 +1,4 @@
-"""Mean distances to neighbours (NMD) and their change, epsilon."""
+"""Neighbour mean distance (NMD) of points, and its change between two spaces, epsilon."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from geounfold.geometry.mesh import Floats, Ints
 from geounfold.quality.lattice_neighbours import lattice_nmd
 
 NEIGHBOURS = 26
-"""Neighbours per point: those of a block inside a lattice that share a face, edge or corner."""
+"""Neighbours of a point: on a lattice, the blocks that share a face, an edge or a corner."""
+
+CACHED = 1 << 11
+"""Points whose distances are summed at once: they fit into the processor's cache."""
+
+_CHUNK = 1 << 16  # points whose neighbours are searched at once: 28 MB beside the answer
 
 
-_CHUNK = 1 << 16  # points whose neighbours are sought at once: 28 MB beside the answer
-
-
-CACHED = 1 << 11  # points whose distances are summed at once: they stay in the cache
-
-
-def neighbour_cloud(points: Floats, name: str = "points") -> Floats:
-    """Return points as contiguous (n, 3) floats, or raise InputError."""
+def finite_points(points: Floats, name: str = "points") -> Floats:
+    """Return points as contiguous (n, 3) floats; raise InputError if they are not such points."""
     P = np.ascontiguousarray(points, dtype=np.float64)
     if P.ndim != 2 or P.shape[1] != 3:
         raise InputError(f"{name} must have shape (n, 3), but have {P.shape}")
@@ -33,14 +32,14 @@ def neighbour_cloud(points: Floats, name: str = "points") -> Floats:
     return P
 
 
-def same_rows(a: Floats, b: Floats, names: str) -> None:
-    """Raise InputError unless two arrays have the same shape."""
+def check_same_rows(a: Floats, b: Floats, names: str) -> None:
+    """Raise InputError unless two arrays have the same number of rows."""
     if len(a) != len(b):
         raise InputError(f"{names} must pair row by row, but have {len(a)} and {len(b)} rows")
 
 
 def neighbours(points: Floats, k: int = NEIGHBOURS) -> Ints:
-    """Return the k nearest neighbours of each point, itself left out.
+    """Return the k nearest neighbours of each point, without the point itself.
 
     Parameters
     ----------
@@ -52,19 +51,20 @@ def neighbours(points: Floats, k: int = NEIGHBOURS) -> Ints:
     Returns
     -------
     (n, k) int
-        Row numbers, nearest first; of equally near ones, any, but always the same.
+        Row numbers, nearest first.  Equally near points come in an arbitrary order, which is the
+        same in every call.
 
     Raises
     ------
     InputError
-        Wrong shape, values that are not finite, k < 1 or too few points.
+        A wrong shape, values that are not finite, k < 1, or too few points.
 
     Examples
     --------
     >>> neighbours(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0]]), k=2).tolist()
     [[1, 2], [0, 2], [1, 0]]
     """
-    P = neighbour_cloud(points)
+    P = finite_points(points)
     _check_neighbours(len(P), k)
     tree = cKDTree(P)
     out = np.empty((len(P), k), dtype=np.int64)
@@ -74,7 +74,7 @@ def neighbours(points: Floats, k: int = NEIGHBOURS) -> Ints:
 
 
 def _check_neighbours(count: int, k: int) -> None:
-    """Raise InputError where points cannot have k neighbours."""
+    """Raise InputError if there are too few points for k neighbours, or k is below 1."""
     if k < 1:
         raise InputError(f"the number of neighbours must be at least 1, but is {k}")
     if count <= k:
@@ -89,12 +89,12 @@ def _nearest(tree: cKDTree, rows: slice | Ints, k: int) -> Ints:
 
 
 def _without_self(found: Ints, rows: Ints) -> Ints:
-    """Drop each row's own number; among coincident points it need not come first."""
+    """Return neighbours without the row itself, which is not always first among coincident ones."""
     itself = found == rows[:, None]
     if itself[:, 0].all():
         first: Ints = found[:, 1:]
         return first
-    # Where more points coincide than were asked for, the row itself may be missing: drop any.
+    # If more points coincide than are searched, the row itself may be missing: drop the first.
     itself[~itself.any(axis=1), 0] = True
     others: Ints = found[~itself].reshape(len(found), -1)
     return others
@@ -118,25 +118,27 @@ def nmd(points: Floats, neighbours: Ints) -> Floats:
     Raises
     ------
     InputError
-        Wrong shapes, values that are not finite or row numbers out of range.
+        Wrong shapes, values that are not finite, or row numbers out of range.
 
     Examples
     --------
     >>> nmd(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0]]), np.array([[1, 2], [0, 2], [1, 0]]))
     array([2. , 1.5, 2.5])
     """
-    P, N = neighbour_cloud(points), np.asarray(neighbours)
+    P, N = finite_points(points), np.asarray(neighbours)
     if N.ndim != 2 or len(N) != len(P) or N.shape[1] == 0:
         raise InputError(f"neighbours must have shape ({len(P)}, k), but have {N.shape}")
     if not 0 <= N.min() <= N.max() < len(P):
-        raise InputError(f"neighbours name rows {N.min()}..{N.max()}, but there are {len(P)}")
+        raise InputError(
+            f"neighbours must be rows 0 to {len(P) - 1}, but are {N.min()} to {N.max()}"
+        )
     return _mean_distance(np.ascontiguousarray(P.T), np.arange(len(P)), N)
 
 
 def _mean_distance(axes: Floats, rows: Ints, ids: Ints) -> Floats:
-    """Return the mean distance from points in some rows (m,) to their neighbours (m, k).
+    """Return the mean distance from the points of some rows (m,) to their neighbours (m, k).
 
-    ``axes`` (3, n) are the points' columns.
+    ``axes`` (3, n) holds the points' coordinates, one row per axis.
     """
     out = np.empty(len(rows))
 
@@ -155,17 +157,19 @@ def epsilon(
 ) -> Floats:
     """Return the relative change of the neighbour mean distance (thesis, equation 2.4).
 
-    ``|NMD(A_i) - NMD(B_i)| / NMD(A_i)``: its rows are the distribution of equation 2.3, their sum
-    is equation 2.5.  It tells neither stretching from shrinking nor a fold from none.
+    ``|NMD(A_i) - NMD(B_i)| / NMD(A_i)``: the rows are the distribution of equation 2.3, their sum
+    is equation 2.5.  Epsilon does not distinguish stretching from shrinking, and a folded body
+    may have a small one.
 
     Parameters
     ----------
     A, B : (n, 3) float
-        Reference and other cloud, row by row the same points, *in the same unit*.
+        Reference points and the same points elsewhere, row by row, *in the same unit*.
     k : int
         Number of neighbours.
-    mode : "reference" or "own"
-        Whether B keeps the neighbours found in A, or each cloud has its own.
+    mode : {"reference", "own"}
+        ``reference``: the neighbours found in A are used in B too.  ``own``: neighbours are found
+        in A and in B.
 
     Returns
     -------
@@ -175,7 +179,8 @@ def epsilon(
     Raises
     ------
     InputError
-        Unequal shapes, an unknown mode, too few points, or coincident points in A.
+        Shapes differ, the mode is unknown, there are too few points, or a point of A coincides
+        with all its neighbours.
 
     Examples
     --------
@@ -183,8 +188,8 @@ def epsilon(
     >>> epsilon(A, 2 * A, k=2)
     array([1., 1., 1.])
     """
-    A, B = neighbour_cloud(A, "A"), neighbour_cloud(B, "B")
-    same_rows(A, B, "A and B")
+    A, B = finite_points(A, "A"), finite_points(B, "B")
+    check_same_rows(A, B, "A and B")
     if mode not in ("reference", "own"):
         raise InputError(f"mode must be 'reference' or 'own', but is {mode!r}")
     if mode == "own":
@@ -194,16 +199,16 @@ def epsilon(
 
 
 def _change(before: Floats, after: Floats, k: int) -> Floats:
-    """Return the relative change of mean distances, (n,)."""
+    """Return the relative change of mean distances (n,); raise InputError if one is 0 before."""
     if not before.all():
         raise InputError(f"point {int(np.argmin(before))} of A coincides with its {k} neighbours")
     return np.abs(before - after) / before
 
 
 def _kept_neighbours(A: Floats, B: Floats, rows: Ints, k: int) -> tuple[Floats, Floats]:
-    """Return the mean distance of some points (m,) to their neighbours in A, in A and in B.
+    """Return the mean distances in A and in B of some points (m,) to their neighbours in A.
 
-    The neighbours of a part of them at a time: memory does not grow with their number.
+    Neighbours are held for a chunk of points at a time, so memory does not grow with m.
     """
     before, after = np.empty(len(rows)), np.empty(len(rows))
     if len(rows):
@@ -217,15 +222,16 @@ def _kept_neighbours(A: Floats, B: Floats, rows: Ints, k: int) -> tuple[Floats, 
 
 
 def lattice_epsilon(A: Floats, B: Floats, cells: Ints, sides: Floats, k: int) -> Floats:
-    """Return `epsilon` of blocks on a lattice, (n,): exact, many times faster than by a tree.
+    """Return `epsilon` of blocks on a lattice, (n,): exact, and much faster than by a search tree.
 
-    Of equally near neighbours the mean counts; a tree takes any.  So the answer depends neither
-    on the order of the rows nor on how the body lies in space.
+    If more blocks are equally near than there is room for among k neighbours, the mean over them
+    counts, whereas a tree picks some of them.  The answer therefore depends neither on the order
+    of the rows nor on the body's position and orientation.
 
     Parameters
     ----------
     A, B : (n, 3) float
-        As for `epsilon`.
+        Reference blocks and the same blocks elsewhere, row by row, in the same unit.
     cells : (n, 3) int
         Lattice cell of each block of A.
     sides : (3,) float
@@ -236,10 +242,10 @@ def lattice_epsilon(A: Floats, B: Floats, cells: Ints, sides: Floats, k: int) ->
     Raises
     ------
     InputError
-        As `epsilon` does.
+        Shapes differ, there are too few points, or a point of A coincides with all its neighbours.
     """
-    A, B = neighbour_cloud(A, "A"), neighbour_cloud(B, "B")
-    same_rows(A, B, "A and B")
+    A, B = finite_points(A, "A"), finite_points(B, "B")
+    check_same_rows(A, B, "A and B")
     _check_neighbours(len(A), k)
     found = lattice_nmd(cells, sides, (A, B), k)
     if found is None:

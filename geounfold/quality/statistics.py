@@ -1,4 +1,4 @@
-"""Mean, standard deviation, 95th percentile and largest value of a figure."""
+"""Mean, standard deviation, 95th percentile and maximum of a set of values."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class Statistics:
 
     @classmethod
     def of(cls, values: Floats) -> Statistics:
-        """Summarise values of any shape.
+        """Return the statistics of values of any shape.
 
         Raises
         ------
         InputError
-            No values, or some that are not finite.
+            There are no values, or some are not finite.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""Blocks that came to lie far from a block that they touch."""
+"""Blocks that the unfolding separated from a block that they touch when folded."""
 
 from __future__ import annotations
 
@@ -9,35 +9,34 @@ from geounfold.backends.threads import cores
 from geounfold.geometry.mesh import Floats, Ints
 
 SUSPECT = 1.0
-"""Neighbour distance error from which a block is looked at for being torn from its neighbours.
+"""Epsilon from which a block is checked for being torn from its neighbours.
 
-Measured: at most 0.52 on 28 sound unfoldings whose limbs keep apart.  Where limbs all but touch,
-blocks have some of their 26 neighbours on the other limb and go above it, rightly.
+On 28 sound unfoldings with limbs well apart, epsilon is at most 0.52.  If limbs almost touch, some
+of a block's 26 neighbours lie on the other limb, and its epsilon rightly exceeds 1.
 """
-
 
 TORN = 4.0
-"""A block is torn from one that it touches where they come to lie so many times farther apart.
+"""Factor by which the distance to a touching block must grow for a block to count as torn.
 
-Flexural slip alone draws neighbours apart by up to the change of heading in radians: 2.2 times at
-220 degrees between the limbs, 3.3 at a full turn.
+Flexural slip alone multiplies the distance by up to the change of heading in radians: 2.2 at 220
+degrees between the limbs, 3.3 at a full turn.
 """
 
-
-_TOUCH = 1.3  # times the distance to the nearest: blocks face to face, not edge to edge (1.41)
+_TOUCH = 1.3  # times the nearest block's distance: includes face neighbours, not edge ones (1.41)
 
 
 def torn_blocks(folded: Floats, unfolded: Floats, sides: Floats | None, suspects: Ints) -> Ints:
-    """Return those of some blocks that came to lie far from a block that they touch.
+    """Return the rows of those suspects that are torn from a block that they touch.
 
     Parameters
     ----------
     folded, unfolded : (n, 3) float
-        Blocks in both spaces, the former along the lattice's axes where it has one; same unit.
+        Blocks in both spaces, in the same unit.  On a lattice, the folded blocks are given along
+        the lattice's axes.
     sides : (3,) float or None
-        Sides of the blocks, in that unit; None where they are not known.
+        Sides of the blocks, in the same unit; None if unknown.
     suspects : (k,) int
-        Rows to look at.
+        Rows to check.
     """
     if not len(suspects):
         return suspects

@@ -1,4 +1,4 @@
-"""Distance of an unfolding from a known truth."""
+"""Comparison of an unfolding with a known truth."""
 
 from __future__ import annotations
 
@@ -12,29 +12,27 @@ from geounfold.geometry.measures import lengths
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.quality.neighbour_distances import (
     NEIGHBOURS,
+    check_same_rows,
     epsilon,
-    neighbour_cloud,
+    finite_points,
     neighbours,
-    same_rows,
 )
 from geounfold.quality.statistics import Statistics
 
-_PAIRS = 100_000  # pairs that the far distances are sampled with
-
-
-_ALONG = 0.95  # cosine from which a pair of neighbours counts as lying along an axis (18 degrees)
+_PAIRS = 100_000  # random pairs by which distances between far points are sampled
+_ALONG = 0.95  # cosine from which a pair of neighbours counts as parallel to an axis (18 degrees)
 
 
 def aligned_rms(Y: Floats, W: Floats) -> float:
     """Return the root mean square distance of Y from W after the best rigid motion.
 
-    The motion is a proper rotation and a translation (Kabsch 1976), so that a mirrored answer
-    scores badly, as it should.
+    The motion is a proper rotation and a translation (Kabsch 1976), so a mirrored answer has a
+    large distance.
 
     Parameters
     ----------
     Y, W : (n, 3) float
-        Answer and truth, row by row the same points, in the same unit.
+        Answer and truth: the same points row by row, in the same unit.
 
     Returns
     -------
@@ -44,7 +42,7 @@ def aligned_rms(Y: Floats, W: Floats) -> float:
     Raises
     ------
     InputError
-        Unequal shapes, no points, or values that are not finite.
+        Shapes differ, there are no points, or values are not finite.
 
     Examples
     --------
@@ -54,8 +52,8 @@ def aligned_rms(Y: Floats, W: Floats) -> float:
     >>> round(aligned_rms(W * [1, 1, -1], W), 2)
     0.67
     """
-    Y, W = neighbour_cloud(Y, "Y"), neighbour_cloud(W, "W")
-    same_rows(Y, W, "Y and W")
+    Y, W = finite_points(Y, "Y"), finite_points(W, "W")
+    check_same_rows(Y, W, "Y and W")
     if not len(Y):
         raise InputError("there are no points to align")
     a, b = Y - Y.mean(axis=0), W - W.mean(axis=0)
@@ -65,7 +63,7 @@ def aligned_rms(Y: Floats, W: Floats) -> float:
 
 
 def random_pairs(n: int, count: int = _PAIRS, seed: int = 0) -> Ints:
-    """Return `count` random pairs of different row numbers below n >= 2, (count, 2) int."""
+    """Return `count` pairs of different row numbers below n, (count, 2) int; n is at least 2."""
     if n < 2:
         raise InputError(f"pairs need at least 2 points, but there are {n}")
     rng = np.random.default_rng(seed)
@@ -74,59 +72,59 @@ def random_pairs(n: int, count: int = _PAIRS, seed: int = 0) -> Ints:
 
 
 def distance_ratios(A: Floats, B: Floats, pairs: Ints) -> Floats:
-    """Return the distance between paired points in B over that in A.
+    """Return the distance between paired points in B over their distance in A.
 
-    Over far pairs (`random_pairs`) this sees a fold that near neighbours hide.
+    Over far pairs (`random_pairs`) this ratio reveals a fold that near neighbours do not.
 
     Parameters
     ----------
     A, B : (n, 3) float
-        Reference and other cloud, in the same unit.
+        Reference points and the same points elsewhere, in the same unit.
     pairs : (m, 2) int
         Row numbers.
 
     Returns
     -------
     (m,) float
-        1 where the distance is kept; pairs that coincide in A are left out.
+        1 for a distance that is kept; pairs that coincide in A are left out.
 
     Raises
     ------
     InputError
-        Unequal shapes, or no pair with a distance in A.
+        Shapes differ, or all pairs coincide in A.
     """
-    A, B = neighbour_cloud(A, "A"), neighbour_cloud(B, "B")
-    same_rows(A, B, "A and B")
+    A, B = finite_points(A, "A"), finite_points(B, "B")
+    check_same_rows(A, B, "A and B")
     before, after = lengths(A, pairs), lengths(B, pairs)
     apart = before > 0
     if not apart.any():
-        raise InputError("no pair of points has a distance to compare with")
+        raise InputError("all pairs of points coincide: there is no distance to compare with")
     return after[apart] / before[apart]
 
 
 def spacing_ratios(
     Y: Floats, W: Floats, k: int = NEIGHBOURS
 ) -> tuple[float | None, float | None, float | None]:
-    """Return how much the spacing along each axis of the truth was stretched.
+    """Return how much the spacing along each axis of the truth is stretched.
 
-    The median, over neighbours in W whose line lies within 18 degrees of the axis, of their
-    distance in Y over that in W.  It does not depend on how Y is turned.
+    For each axis, neighbours in W are taken whose line lies within 18 degrees of it.  The stretch
+    is the median of their distance in Y over that in W.  It does not depend on Y's rotation.
 
     Parameters
     ----------
     Y, W : (n, 3) float
         Answer and truth, in the same unit.
     k : int
-        Number of neighbours looked at.
+        Number of neighbours of each point.
 
     Returns
     -------
     tuple of 3
-        1 where the spacing is true; None for an axis that no neighbours lie along (a body one
-        block thick has none across).
+        1 for a true spacing; None for an axis along which no neighbours lie (across a body one
+        block thick).
     """
-    Y, W = neighbour_cloud(Y, "Y"), neighbour_cloud(W, "W")
-    same_rows(Y, W, "Y and W")
+    Y, W = finite_points(Y, "Y"), finite_points(W, "W")
+    check_same_rows(Y, W, "Y and W")
     ids = neighbours(W, k)
     pairs = np.stack([np.repeat(np.arange(len(W)), k), ids.ravel()], axis=1)
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
@@ -142,24 +140,24 @@ def spacing_ratios(
 
 @dataclass(frozen=True)
 class TruthQuality:
-    """An unfolding compared with the truth, and what doing nothing would have scored.
+    """Figures of the unfolded body Y beside those of the folded body X, against the truth W.
 
     Attributes
     ----------
     epsilon_truth : Statistics
-        epsilon(W, Y): neighbours of the truth W, kept in the answer Y.
+        epsilon(W, Y), with the neighbours found in the truth W.
     epsilon_folded : Statistics
-        epsilon(X, Y): neighbours of the folded body X; needs no truth, and 0 for doing nothing.
+        epsilon(X, Y), with the neighbours found in the folded body X; needs no truth.
     epsilon_nothing : Statistics
-        epsilon(W, X): the score of leaving the body folded.
+        epsilon(W, X): epsilon of the folded body itself.
     rms, rms_nothing : float
-        Root mean square distance of Y, and of X, from W after the best proper rotation.
+        Root mean square distance of Y, and of X, from W after the best rotation and translation.
     spacing : tuple of 3 float or None
-        See `spacing_ratios`.
+        Stretch of the spacing along each axis of W (`spacing_ratios`).
     distances : Statistics
-        |ratio - 1| of distances between far points, answer over truth.
+        |ratio - 1| of distances between far points, Y over W.
     distances_nothing : Statistics
-        The same for the folded body.
+        |ratio - 1| of distances between far points, X over W.
     """
 
     epsilon_truth: Statistics
@@ -182,19 +180,19 @@ def compare_with_truth(X: Floats, Y: Floats, W: Floats, k: int = NEIGHBOURS) -> 
     Parameters
     ----------
     X, Y, W : (n, 3) float
-        Folded, unfolded and true points, row by row the same, in the same unit.
+        Folded, unfolded and true points: the same points row by row, in the same unit.
     k : int
         Number of neighbours.
 
     Returns
     -------
     TruthQuality
-        Figures of the answer beside those of doing nothing.
+        Figures of Y beside those of X.
 
     Raises
     ------
     InputError
-        Unequal shapes, too few points, values that are not finite.
+        Shapes differ, there are too few points, or values are not finite.
     """
     far = random_pairs(len(W))
     return TruthQuality(

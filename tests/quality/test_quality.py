@@ -216,14 +216,14 @@ def test_torn_blocks_are_those_that_part_from_what_they_touch():
         (lambda: neighbours(GRID, 0), "at least 1"),
         (lambda: neighbours(np.where(GRID == 8, np.nan, GRID)), "row 448 is not finite"),
         (lambda: nmd(GRID, neighbours(GRID)[1:]), "neighbours must have shape"),
-        (lambda: nmd(GRID, np.full((len(GRID), 2), len(GRID))), "neighbours name rows"),
+        (lambda: nmd(GRID, np.full((len(GRID), 2), len(GRID))), "neighbours must be rows 0 to"),
         (lambda: epsilon(GRID, GRID[1:]), "A and B must pair row by row"),
         (lambda: epsilon(GRID, GRID, mode="both"), "mode must be"),
         (lambda: epsilon(0 * GRID, GRID), "coincides with its 26 neighbours"),
         (lambda: aligned_rms(GRID[:0], GRID[:0]), "no points to align"),
         (lambda: aligned_rms(GRID, GRID[1:]), "Y and W must pair row by row"),
         (lambda: random_pairs(1), "at least 2 points"),
-        (lambda: distance_ratios(GRID, GRID, np.array([[1, 1]])), "no pair of points"),
+        (lambda: distance_ratios(GRID, GRID, np.array([[1, 1]])), "all pairs of points coincide"),
         (lambda: Statistics.of(np.array([])), "no values"),
         (lambda: Statistics.of(np.array([1.0, np.nan])), "1 of 2 values are not finite"),
         (
@@ -232,7 +232,7 @@ def test_torn_blocks_are_those_that_part_from_what_they_touch():
         ),
         (
             lambda: block_quality(cube_map(np.eye(3)), np.full(len(GRID), -2), GRID, GRID),
-            "elements name -2..-2, but there are 6",
+            "elements must be -1 to 5, but are -2 to -2",
         ),
     ],
 )

@@ -1,8 +1,8 @@
-"""Cross-check of meshes: the control mesh against others of the same border.
+"""Cross-check of the control mesh against other meshes of the same border.
 
-The control mesh is made of prisms and its inside follows from them.  Here other meshers fill its
-folded border, our map lays the border flat, and the inside follows by a rule that knows nothing of
-prisms.  Volumes, borders, elements and the blocks' flat places are compared.
+The control mesh is made of prisms, which fix the map of its inside.  Here other meshers fill its
+folded border.  Our map flattens the border; the inside follows by a rule that does not use the
+prisms.  Volumes, borders, elements and the blocks' unfolded positions are compared.
 """
 
 from __future__ import annotations
@@ -51,33 +51,33 @@ def crosscheck(
 ) -> CrossCheck:
     """Check an unfolding's control mesh against other meshes of its border.
 
-    Each mesher fills the folded border of the control mesh (without its shell).  Its border
-    vertices take their flat places from our map, its inside follows harmonically or as rigidly as
-    possible, and the blocks are carried by its barycentric coordinates.  The control mesh itself is
-    carried through the same rules, which tells what the rule does from what the mesh does.
+    Each mesher fills the folded border of the control mesh (without its shell).  Our map gives the
+    unfolded positions of the border's vertices, the inside follows harmonically or as rigidly as
+    possible, and the blocks are carried by barycentric coordinates.  The control mesh is put
+    through the same rules, which separates the effect of the rule from that of the mesh.
 
     Parameters
     ----------
     unfolding : Unfolding
-        What ``unfold`` returned.
+        The result of ``unfold``.
     options : CrossCheckOptions, optional
-        Defaults where not given.
+        Defaults if not given.
     progress : callable, optional
-        Called with every stage's name as it starts.
+        Called with the name of each stage when it starts.
     **changes
-        Fields of CrossCheckOptions given by name.
+        Fields of CrossCheckOptions, by name.
 
     Returns
     -------
     CrossCheck
-        A mesher that fails, crashes or is not installed is a row that says so.  TetGen's mesh is
-        the same bit for bit in every run; fTetWild's is not, since its random numbers cannot be
+        If a mesher fails, crashes or is not installed, its row gives the reason.  TetGen's mesh is
+        the same in every run, bit for bit; fTetWild's is not, since its random numbers cannot be
         seeded.
 
     Raises
     ------
     OptionError
-        Options outside their valid values, or a method that has no control mesh.
+        An option outside its valid values, or a method without a control mesh.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def crosscheck(
 
 
 class _Run:
-    """One cross-check as it goes on."""
+    """A cross-check in progress."""
 
     def __init__(
         self, unfolding: Unfolding, options: CrossCheckOptions, progress: Progress
@@ -135,7 +135,7 @@ class _Run:
         self.grids: dict[str, TetMesh] = {}
 
     def mesh(self, name: str) -> None:
-        """Make a mesh and compare it; what fails becomes a row."""
+        """Make a mesh and compare it; a failure becomes a row with its reason."""
         self._progress(f"{name} mesh")
         try:
             mesh, seconds = (
@@ -158,7 +158,7 @@ class _Run:
     def _placed(
         self, name: str, interior: str, follower: Follower, carrier: Carrier
     ) -> PlaceFigures:
-        """Return how far the blocks' places are from ours."""
+        """Return how far this mesh's positions of the blocks are from the map's."""
         started = time.perf_counter()
         try:
             if not carrier.found.any():
@@ -198,7 +198,7 @@ class _Run:
         )
 
     def _spread(self, values: Floats) -> Floats:
-        """Return values of the points that were compared among all points, NaN for the others."""
+        """Return the values of the points compared as a column over all points, NaN elsewhere."""
         out = np.full((self._count, *values.shape[1:]), np.nan)
         out[self._rows] = values
         return out

@@ -1,4 +1,4 @@
-"""Other meshes of the control mesh's border, and how meshes and borders differ."""
+"""Meshes that other meshers make of the control mesh's border, and figures that compare them."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from geounfold.geometry.tet_shapes import dihedral_angles, radius_ratios
 
 
 def border(mesh: TetMesh) -> TriMesh:
-    """Return a mesh's boundary faces, outward, over all its vertices."""
+    """Return a mesh's boundary faces, oriented outward, with all vertices of the mesh."""
     return TriMesh(mesh.V, boundary_faces(mesh.T)[0])
 
 
 def without_unused(mesh: TetMesh) -> TetMesh:
-    """Return a mesh without vertices of no tetrahedron, which no inside could move."""
+    """Return a mesh without vertices that belong to no tetrahedron; no rule could move those."""
     used, T = np.unique(mesh.T, return_inverse=True)
     return TetMesh(mesh.V[used], T.reshape(-1, 4))
 
 
 def fill(name: str, surface: TriMesh, options: CrossCheckOptions) -> tuple[TetMesh, float]:
-    """Return a mesher's tetrahedra inside a closed surface, and the seconds they took.
+    """Return a mesher's tetrahedra inside a closed surface, and its wall time in seconds.
 
     Raises
     ------
     MissingDependencyError
         The mesher is not installed.
     BackendError
-        It failed, crashed or took too long, or its answer is no mesh.
+        The mesher failed, crashed, took too long or returned no valid mesh.
     """
     if find_spec(MESHERS[name]) is None:
         raise MissingDependencyError(
@@ -52,21 +52,27 @@ def fill(name: str, surface: TriMesh, options: CrossCheckOptions) -> tuple[TetMe
     function = f"geounfold.backends.{name}:tetrahedralize"
     V, T = call_apart(name, function, arguments, options.seconds)
     if not len(T):
-        raise BackendError(f"{name} found nothing inside the border")
+        raise BackendError(f"{name} made no tetrahedron inside the border")
     return TetMesh(V, T), time.perf_counter() - started
 
 
 def figures(
     name: str, mesh: TetMesh, surface: TriMesh, scale: float, seconds: float
 ) -> MeshFigures:
-    """Return the figures of a mesh (working units) of a surface's inside.
+    """Return the figures of a mesh that fills a surface.
 
     Parameters
     ----------
+    name : str
+        The mesher, or ``prism``.
+    mesh : TetMesh
+        The mesh, in working units.
     surface : TriMesh
-        The control mesh's border, closed.
+        The control mesh's border, closed, in working units.
     scale : float
-        The working unit in the input's.
+        Length of the working unit in the input's unit.
+    seconds : float
+        Wall time of the mesher.
     """
     own, volumes = border(mesh), tet_volumes(mesh.V, mesh.T)
     angles, ratios = dihedral_angles(mesh.V, mesh.T), radius_ratios(mesh.V, mesh.T)
@@ -97,17 +103,17 @@ def figures(
 
 
 def farthest(one: TriMesh, other: TriMesh) -> float:
-    """Return the largest distance from a surface to another: the one-sided Hausdorff distance.
+    """Return the largest distance from one surface to another (one-sided Hausdorff distance).
 
-    Measured at vertices, midpoints of edges and midpoints of faces, which is less than the true
-    one by at most the distance between those (a third of an edge).
+    The distance is measured at vertices and at midpoints of edges and faces.  It is too small by
+    at most the spacing of these points, a third of an edge.
     """
     index = SurfaceIndex(other.V, other.F)
     return float(index.closest(_places(one))[0].max())
 
 
 def _places(surface: TriMesh) -> Floats:
-    """Return vertices, and midpoints of edges and faces, of a surface."""
+    """Return a surface's vertices and the midpoints of its edges and faces."""
     E, V = unique_edges(surface.F), surface.V
     used = np.unique(surface.F)
     return np.concatenate([V[used], V[E].mean(axis=1), V[surface.F].mean(axis=1)])

@@ -1,7 +1,8 @@
-"""Flat places of points by a mesh whose border follows the map and whose inside follows the border.
+"""Unfolded positions of points by a mesh of which only the border is taken from the map.
 
-Two ways for the inside, both over the folded shape: each flat coordinate harmonic (cotangent
-weights), or as rigid as possible (Sorkine and Alexa 2007, over tetrahedra: Chao et al. 2010).
+The inside follows the border in one of two ways, both computed on the folded shape.  Either each
+unfolded coordinate is harmonic (cotangent weights), or the inside is as rigid as possible (Sorkine
+and Alexa 2007; over tetrahedra, Chao et al. 2010).
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from geounfold.comparison.crosscheck._meshes import border
 from geounfold.geometry.mesh import Floats, Ints, TetMesh
 from geounfold.mapping.control_mesh import ControlMesh
 
-_STILL = 1e-4  # blocks: local-global steps stop where no vertex moves farther
-_STEPS = 200
+_STILL = 1e-4  # blocks: local-global steps stop when no vertex moves farther
+_STEPS = 200  # local-global steps at most
 
 
 class Follower:
-    """A mesh of the control mesh's inside, with its border where our map lays it.
+    """A mesh of the control mesh's inside, unfolded by its border alone.
 
     Parameters
     ----------
     mesh : TetMesh
-        Folded, working units.
+        The folded mesh, in working units.
     control : ControlMesh
-        The map, working units.
+        The map that gives the border's unfolded positions, in working units.
     """
 
     def __init__(self, mesh: TetMesh, control: ControlMesh) -> None:
@@ -42,7 +43,12 @@ class Follower:
         self._harmonic: Floats | None = None
 
     def unfolded(self, interior: str) -> tuple[TetMesh, int]:
-        """Return the unfolded mesh, and the local-global steps that it took.
+        """Return the unfolded mesh and the number of local-global steps.
+
+        Parameters
+        ----------
+        interior : {"harmonic", "arap"}
+            How the inside follows the border.
 
         Raises
         ------
@@ -58,9 +64,9 @@ class Follower:
 
 
 def border_places(points: Floats, control: ControlMesh) -> Floats:
-    """Return where the map lays points (n, 3) that lie on its border, or within rounding of it.
+    """Return the unfolded positions of points (n, 3) on the map's border, to within rounding.
 
-    Each goes with the closest place on the border.
+    Each point moves with the closest point of the border.
     """
     surface = border(control.folded)
     _, face, closest = SurfaceIndex(surface.V, surface.F).closest(points)
@@ -71,12 +77,12 @@ def border_places(points: Floats, control: ControlMesh) -> Floats:
 
 
 class Carrier:
-    """Points located once in a folded mesh, to be carried to any of its images.
+    """Points located once in a folded mesh, and then carried to any image of it.
 
     Attributes
     ----------
     found : (n,) bool
-        Whether the mesh holds each point.
+        Whether each point lies inside the mesh.
     """
 
     def __init__(self, mesh: TetMesh, points: Floats) -> None:
@@ -86,7 +92,7 @@ class Carrier:
         self._weights = barycentric_in_tets(points[self.found], mesh.V, self._corners)
 
     def carry(self, image: TetMesh) -> Floats:
-        """Return the points in an image of the mesh, (n, 3); NaN for those it does not hold."""
+        """Return the points in an image of the mesh, (n, 3); NaN for points outside the mesh."""
         out = np.full((len(self.found), 3), np.nan)
         out[self.found] = np.einsum("ij,ijk->ik", self._weights, image.V[self._corners])
         return out

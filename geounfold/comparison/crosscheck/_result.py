@@ -1,4 +1,4 @@
-"""What comes of a cross-check: figures of each mesh, of the places that it gives, and a verdict."""
+"""The result of a cross-check: figures of meshes and of positions, and warnings."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ PRISM = "prism"
 
 @dataclass(frozen=True)
 class MeshFigures:
-    """A mesh of the control mesh's border, and its elements; lengths in blocks.
+    """Figures of one mesh of the control mesh's border; lengths in blocks.
 
     Attributes
     ----------
     mesh : str
-        ``prism``: the control mesh itself; or the mesher.
+        The mesher, or ``prism`` for the control mesh itself.
     vertices, tetrahedra, boundary_faces : int
-        How many.
+        Their numbers.
     inverted : int
         Tetrahedra whose folded volume is not positive.
     volume : float
         Sum of the tetrahedra's signed volumes, in the input's unit cubed.
     boundary_volume : float
-        Signed volume inside the mesh's own border, likewise.
+        Signed volume inside the mesh's own border, in the input's unit cubed.
     volume_difference : float
-        volume over that inside the control mesh's border, less 1.
+        ``volume`` over the volume inside the control mesh's border, minus 1.
     hausdorff_to, hausdorff_from : float
-        Largest distance from a place of this mesh's border to the control mesh's, and back.
+        Largest distance from this mesh's border to the control mesh's border, and back.
     dihedral_min, dihedral_p05, dihedral_median, dihedral_p95, dihedral_max : float
         Dihedral angles, degrees.
     radius_ratio_min, radius_ratio_p05, radius_ratio_median : float
         Three times the inscribed over the circumscribed radius; 1 is regular, 0 flat.
     seconds : float
-        Wall time of the mesher, its process's start included; 0 for the control mesh.
+        Wall time of the mesher, including the start of its process; 0 for the control mesh.
     error : str
-        Why there are no figures (NaN and 0 then); empty where there are.
+        Why the figures are missing (NaN or 0); empty if the mesh was made.
     """
 
     mesh: str
@@ -70,27 +70,29 @@ class MeshFigures:
 
 @dataclass(frozen=True)
 class PlaceFigures:
-    """Flat places of the blocks by a mesh whose border alone follows our map; lengths in blocks.
+    """Distances of one mesh's unfolded positions from the map's; lengths in blocks.
+
+    Only the mesh's border follows the map.
 
     Attributes
     ----------
     mesh : str
-        See MeshFigures.
+        The mesher, or ``prism`` for the control mesh itself.
     interior : str
         How the inside follows the border: a name in INTERIORS.
     blocks : int
         Blocks compared.
     outside : int
-        Blocks that the control mesh holds and this mesh does not.
+        Blocks inside the control mesh but outside this mesh.
     rms, p95, max : float
-        Distance of a block's place from ours.
+        Distance of a block's position from the map's.
     along_layers, across_layers : float
-        Root mean square of its horizontal and its vertical part.
+        Root mean square of the distance's horizontal and vertical part.
     worst : tuple of 3 float
-        Where the largest is: folded, in the input's coordinates.
+        Folded position of the block with the largest distance, in the input's coordinates.
     rms_same_interior : float
-        Root mean square distance from the place that the control mesh gives with the same inside:
-        what is due to the mesh, not to the way its inside follows.  0 for the control mesh.
+        Root mean square distance from the positions that the control mesh gives with the same
+        interior: the part due to the mesh alone.  0 for the control mesh.
     inverted : int
         Tetrahedra whose unfolded volume is not positive.
     steps : int
@@ -98,7 +100,7 @@ class PlaceFigures:
     seconds : float
         Wall time.
     error : str
-        Why there are no figures; empty where there are.
+        Why the figures are missing; empty if they are known.
     """
 
     mesh: str
@@ -120,30 +122,32 @@ class PlaceFigures:
 
 @dataclass(frozen=True, eq=False)
 class CrossCheck:
-    """The control mesh against other meshes of its border; made by ``crosscheck``.
+    """The control mesh beside other meshes of its border; the result of ``crosscheck``.
 
     Attributes
     ----------
     options : CrossCheckOptions
-        As used.
+        The options used.
     block : float
-        The size of a block, in the input's unit.
+        Size of a block, in the input's unit.
     volume : float
         Signed volume inside the control mesh's border, in the input's unit cubed.
     hull_volume, blocks_volume : float
-        Inside the hulls of all bodies, and of their blocks; NaN with reference surfaces.  The
-        control mesh reaches around the hull, so its volume is larger by design.
+        Volume inside the hulls of all bodies, and of their blocks, in the input's unit cubed; NaN
+        if reference surfaces were given.  The control mesh encloses the hull, so its volume is
+        larger by design.
     meshes : tuple of MeshFigures
-        The control mesh first.
+        One per mesh; the control mesh first.
     places : tuple of PlaceFigures
-        By mesh and interior.
+        One per mesh and interior.
     differences : dict of (n,) float
-        By ``mesh_interior``: how far each point's place is from ours, in blocks; NaN where it was
-        not compared (outside).
+        By ``mesh_interior``: distance of each point from the map's position, in blocks; NaN for a
+        point that was not compared (outside).
     points : dict of (n, 3) float
-        By the same names: the points unfolded by that mesh, in the input's unit; NaN likewise.
+        By ``mesh_interior``: the points unfolded by that mesh, in the input's unit; NaN for a
+        point that was not compared.
     grids : dict of TetMesh
-        The meshes by name, folded, in the input's coordinates.
+        By mesh: the folded mesh, in the input's coordinates.
     """
 
     options: CrossCheckOptions
@@ -159,7 +163,7 @@ class CrossCheck:
 
     @property
     def warnings(self) -> list[str]:
-        """One sentence for each disagreement above its bound, and for each failure."""
+        """One line for each difference above its bound and for each failure."""
         found = []
         for mesh in self.meshes:
             own = [places for places in self.places if places.mesh == mesh.mesh]
@@ -167,6 +171,7 @@ class CrossCheck:
         return found
 
     def _mesh_warnings(self, mesh: MeshFigures) -> list[str]:
+        """Return the warnings about one mesh."""
         if mesh.error:
             return [f"cross-check: no {mesh.mesh} mesh: {mesh.error}"]
         found, chosen = [], self.options
@@ -185,7 +190,10 @@ class CrossCheck:
         return found
 
     def _place_warnings(self, name: str, places: list[PlaceFigures]) -> list[str]:
-        """Return what is wrong with a mesh's places; the control mesh's own only explain others."""
+        """Return the warnings about a mesh's positions.
+
+        The control mesh's own positions are not judged: they only help to explain the others.
+        """
         failed = [p for p in places if p.error]
         found = [f"cross-check: {name} mesh, inside {p.interior}: {p.error}" for p in failed]
         if name == PRISM:
@@ -201,15 +209,14 @@ class CrossCheck:
             found.append(
                 f"cross-check: the {name} mesh places blocks {_each(far, 'rms')} block sizes RMS "
                 f"from the map (bound {self.options.position_bound:.2f}), up to {worst.max:.2f} at "
-                f"({where}); the control mesh with the same inside differs from it by "
-                f"{_each(far, 'rms_same_interior')}, the rest is that such an inside is no "
-                "flexural slip"
+                f"({where}). Of this, {_each(far, 'rms_same_interior')} is due to the mesh; the "
+                "rest comes from the interior rule, which does not follow flexural slip"
             )
         return found
 
     @property
     def table(self) -> pd.DataFrame:
-        """One row per mesh and interior, with the figures of both; one for a mesh that failed."""
+        """One row per mesh and interior, with the figures of both; a failed mesh has one row."""
         rows = []
         for mesh in self.meshes:
             figures = asdict(mesh)
@@ -222,7 +229,7 @@ class CrossCheck:
         return pd.DataFrame(rows)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures for JSON, without the blocks' columns and the meshes."""
+        """Return the figures for JSON, without the columns of blocks and the meshes."""
         return {
             "options": asdict(self.options),
             "block": self.block,
@@ -235,26 +242,27 @@ class CrossCheck:
         }
 
     def added_to(self, summary: Mapping[str, Any]) -> dict[str, Any]:
-        """Return an unfolding's summary with the cross-check and its warnings among its own."""
+        """Return an unfolding's summary with the cross-check and its warnings added."""
         warnings = [*summary.get("warnings", []), *self.warnings]
         return {**summary, "crosscheck": self.as_dict(), "warnings": warnings}
 
 
 _COLUMN = {"seconds": "seconds_places", "inverted": "inverted_unfolded"}
-"""What figures of places are called beside those of meshes."""
+"""Columns of PlaceFigures renamed in the table, in which MeshFigures has the same names."""
 
 
 def _each(places: list[PlaceFigures], figure: str) -> str:
-    """Return one figure by interior."""
+    """Return one figure of each interior, in words."""
     return " and ".join(f"{getattr(p, figure):.2f} ({p.interior})" for p in places)
 
 
 def _plain(figures: MeshFigures | PlaceFigures) -> dict[str, Any]:
+    """Return figures for JSON, by name."""
     return {name: _known(value) for name, value in asdict(figures).items()}
 
 
 def _known(value: Any) -> Any:
-    """Return a value as JSON takes it: None for what is not known."""
+    """Return a value for JSON: None if it is not finite."""
     if isinstance(value, tuple):
         return [_known(each) for each in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -190,7 +190,7 @@ class Estimation:
         }
 
 
-def estimate(
+def estimate(  # 11 arguments: a public name; seven of them are choices by keyword
     unfolding: Any,
     samples: pd.DataFrame,
     blocks: pd.DataFrame | Floats | None = None,

@@ -1,4 +1,4 @@
-"""Samples looked at before they estimate: tables that `geounfold.charts` draws."""
+"""Samples looked at before they estimate: tables that `report.plots.grades` draws."""
 
 from __future__ import annotations
 

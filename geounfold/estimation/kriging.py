@@ -112,7 +112,7 @@ def gathered(points: Floats, values: Floats, holes: Ints | None = None) -> Sampl
     return Samples(places, mean, lowest, len(P) - len(places))
 
 
-def krige(
+def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
     points: Floats,
     values: Floats,
     targets: Floats,

@@ -1,7 +1,7 @@
-"""Columns of a report's blocks and samples: told apart by kind, with their limits of colour.
+"""Columns of a report's blocks and samples: their kind, meaning, and limits of colour.
 
-Numbers stay numbers (float32, or 16 bits where there are many columns), texts of few values become
-categories, and a column of one value is kept as that value.
+A column is kept in one of three ways: numbers as float32 (16 bits if there are many columns), texts
+as categories if few of them differ, and a column with one value as that value.
 """
 
 from __future__ import annotations
@@ -19,43 +19,46 @@ from geounfold.report.arrays import encoded, quantised
 from geounfold.report.plots.figures import colour_limits, ratio_limits
 
 MOST_CATEGORIES = 250
-"""Different texts that a column may have to be kept."""
+"""Different texts that a column may hold; a column with more is left out."""
 
-_EXACT = 2**24  # whole numbers that float32 holds
+DISTRIBUTED = ("nmd_error", "volume_ratio", "shear", "stretch_max", "stretch_min")
+"""Columns of the result of which the report shows the distribution."""
 
-# Column: label, what it means, colour map.
+_EXACT = 2**24  # float32 holds whole numbers up to this exactly
+
 MEANINGS = {
-    "stratigraphic": ("height in the layer", "0 at the bottom surface, 1 at the top", "viridis"),
+    "stratigraphic": (
+        "stratigraphic coordinate",
+        "0 at the bottom surface, 1 at the top surface",
+        "viridis",
+    ),
     "nmd_error": (
-        "epsilon(X, Y)",
-        "relative change of the neighbour mean distance, folded X to unfolded Y",
+        "change of neighbour distances",
+        "epsilon(X, Y): relative change of the mean distance to the neighbours, folded to unfolded",
         "cividis",
     ),
-    "volume_ratio": (
-        "volume ratio",
-        "volume of the control tetrahedron, unfolded over folded",
-        "diverging",
-    ),
-    "shear": ("shear", "layer-parallel shear, the slip of layers over one another", "cividis"),
-    "stretch_max": ("largest stretch", "largest principal stretch", "diverging"),
-    "stretch_min": ("smallest stretch", "smallest principal stretch", "diverging"),
+    "volume_ratio": ("volume ratio", "unfolded over folded volume at the block", "diverging"),
+    "shear": ("shear", "layer-parallel shear, the slip between layers", "cividis"),
+    "stretch_max": ("largest stretch", "largest principal stretch at the block", "diverging"),
+    "stretch_min": ("smallest stretch", "smallest principal stretch at the block", "diverging"),
     "mesh_distance": (
         "distance from the control mesh",
-        "0 inside; in the input's unit",
+        "0 for a block inside; in the input's unit",
         "cividis",
     ),
-    "location": ("location", "inside the control mesh, or extrapolated by its shell", ""),
+    "location": ("location", "inside the control mesh, or extrapolated by the shell around it", ""),
     "nmd_folded": (
-        "neighbour mean distance, folded",
+        "neighbour distance, folded",
         "mean distance to the neighbours, in the input's unit",
         "cividis",
     ),
     "nmd_unfolded": (
-        "neighbour mean distance, unfolded",
+        "neighbour distance, unfolded",
         "mean distance to the folded body's neighbours, in the input's unit",
         "cividis",
     ),
 }
+"""Known columns: label, meaning, colour map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +67,18 @@ class Column:
 
     Attributes
     ----------
-    name, label, meaning : str
-        As in the table; in words, where known; what it is.
+    name : str
+        Name in the table.
+    label, meaning : str
+        Name in words, and what the values mean; empty if unknown.
     group : str
-        Which columns it stands with in lists.
+        Heading under which the column is listed.
     colours : str
         Colour map: ``viridis``, ``cividis``, ``diverging``, or empty for categories.
     values : (n,) float or int
-        NaN, or -1 of categories, where there is no value.
+        Numbers (NaN if missing), or codes of categories (-1 if missing).
     categories : tuple of str
-        What the codes mean; empty for numbers.
+        Text of each code; empty for numbers.
     """
 
     name: str
@@ -89,12 +94,12 @@ class Column:
         return replace(self, values=self.values[rows])
 
     def packed(self, *, short: bool) -> dict[str, Any]:
-        """Return the column for JSON; see `geounfold.report.payload` for the form.
+        """Return the column for JSON.
 
         Parameters
         ----------
         short : bool
-            Keep 16 bits of each number: a step of 1/65534 of its range.
+            Whether numbers are kept in 16 bits, in steps of 1/65534 of the column's range.
         """
         facts: dict[str, Any] = {
             "name": self.name,
@@ -129,7 +134,7 @@ class Column:
 
 
 def _numbers(v: Floats, low: float, high: float, short: bool) -> dict[str, Any]:
-    """Return values in the smallest form that tells them apart well enough."""
+    """Return values in the smallest form that keeps their precision."""
     if short:
         return quantised(v, low, (high - low) / 65534)
     offset = low if abs(low) > 100 * (high - low) else 0.0
@@ -147,13 +152,13 @@ def read_columns(
     Parameters
     ----------
     columns : mapping of str to (n,)
-        Numbers, or texts: those that are all numbers, but for blanks, count as numbers.
+        Numbers or texts.  Texts count as numbers if all that are not blank can be read so.
     count : int
-        How many values each must have; others are left out.
+        Number of values; a column with another number is left out.
     group : str
-        Which columns they stand with in lists.
+        Heading under which the columns are listed.
     known : str, optional
-        The group of the columns in MEANINGS.
+        Heading for the columns in MEANINGS; if empty, MEANINGS is not used.
 
     Examples
     --------
@@ -172,7 +177,7 @@ def read_columns(
 
 
 def _read(name: str, values: ArrayLike, group: str, known: str) -> Column | None:
-    """Return a column of numbers or categories; None where it has too many texts."""
+    """Return a column of numbers or categories; None if too many texts differ, or all are blank."""
     label, meaning, colours = MEANINGS.get(name, ("", "", "viridis")) if known else ("", "", "")
     group = known if known and name in MEANINGS else group
     series = pd.Series(np.asarray(values).ravel() if not isinstance(values, pd.Series) else values)
@@ -188,7 +193,7 @@ def _read(name: str, values: ArrayLike, group: str, known: str) -> Column | None
 
 
 def _as_numbers(series: pd.Series[Any]) -> Floats | None:
-    """Return a column as floats, NaN where blank or infinite; None where it holds other texts."""
+    """Return a column as floats, NaN if blank or infinite; None if it holds other texts."""
     if series.dtype.kind in "mMc":
         return None
     if series.dtype.kind in "biuf":

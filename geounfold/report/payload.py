@@ -1,11 +1,17 @@
 """What the viewer draws, as one JSON object of quantised arrays.
 
-Form: ``blocks`` holds the places in both spaces (16 bits per coordinate), the sides of a block (of
-every one, ``sizes``, where they differ) and the axes along which they lie (as columns) in the space
-where it is drawn as a box (the folded one on lattices, else the unfolded one), the gradients times
-these axes for the other, ``bent`` one (16 bits per entry, GRADIENT_STEP each), which blocks lie
-outside, and the rows they come from; ``columns`` their values; ``holes`` traces and samples in
-float32; ``palettes`` the colour maps, 256 colours of three bytes each.
+``blocks`` holds, for the blocks drawn:
+
+- ``folded`` and ``unfolded``: centroids, 16 bits per coordinate;
+- ``sides``: sides of a block, or ``sizes``: sides of every block if they differ;
+- ``axes``: directions of the sides, as columns, in the space in which blocks are drawn as boxes
+  (the folded one on lattices, else the unfolded one);
+- ``bent``: the other space, and ``gradients``: the deformation gradients times the axes there,
+  16 bits per entry, GRADIENT_STEP each;
+- ``outer``: whether each block lies outside, and ``rows``: its data row.
+
+``columns`` holds the blocks' values, ``holes`` traces and samples in float32, and ``palettes`` the
+colour maps, 256 colours of three bytes each.
 """
 
 from __future__ import annotations
@@ -18,9 +24,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.report.arrays import encoded, floating_points, quantised_points
-from geounfold.report.blocks import block_shape, chosen_blocks, gradients, outer_blocks
+from geounfold.report.blocks import Shape, block_shape, chosen_blocks, gradients, outer_blocks
+from geounfold.report.body import ReportBody
 from geounfold.report.columns import Column, read_columns
 from geounfold.report.plots.rendering import block_sides
 from geounfold.report.plots.style import ViewOptions, require
@@ -29,19 +36,19 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 GRADIENT_STEP = 1 / 4096
-"""What one unit of a gradient's code stands for."""
+"""Change of a gradient's entry per unit of its code."""
 
 MOST_POINTS = 20_000
-"""Points of traces, and of samples, that a report holds at most."""
+"""Points that a report holds at most, of traces and of samples each."""
 
 _ROOM = 3_600_000  # bytes for the values of columns, before base64
-_SAMPLE_COLUMNS = 12
+_SAMPLE_COLUMNS = 12  # columns of samples at most
 _SEED = 20_261_125
 _RESULTS = "Results"
 _INPUT = "Input"
 _PALETTES = {"viridis": "viridis", "cividis": "cividis", "diverging": "RdYlBu_r"}
 
-# Okabe and Ito's colours, which stay apart for colour-blind readers; black is the outlines'.
+# Okabe and Ito's colours, distinct for colour-blind readers; black is kept for outlines.
 CATEGORIES = (
     "#0072B2",
     "#E69F00",
@@ -61,11 +68,11 @@ class CarriedPoints:
     Attributes
     ----------
     hole : (m,) of str or None
-        Which hole each belongs to; points of one hole follow each other.  None of loose samples.
+        The hole of each point; points of one hole are consecutive.  None if holes are unknown.
     folded, unfolded : (m, 3) float
-        NaN in the unfolded space where the map does not reach.
+        Points in both spaces; NaN in the unfolded space for a point beyond the map's reach.
     columns : mapping of str to (m,)
-        What is known of them.
+        Values of the points.
     """
 
     hole: ArrayLike | None
@@ -80,8 +87,10 @@ class CarriedHoles:
 
     Attributes
     ----------
-    traces, samples : CarriedPoints or None
-        Points along the holes that are joined by lines; samples or composites.
+    traces : CarriedPoints or None
+        Points along the holes, drawn as lines.
+    samples : CarriedPoints or None
+        Samples or composites, drawn as dots.
     """
 
     traces: CarriedPoints | None = None
@@ -90,14 +99,14 @@ class CarriedHoles:
 
 @dataclass(frozen=True, eq=False)
 class Payload:
-    """What a page's viewer needs.
+    """The viewer's data, and notes about what it leaves out.
 
     Attributes
     ----------
     content : dict
-        For JSON.
+        The data, ready for JSON.
     notes : tuple of str
-        What was left out, in sentences.
+        One sentence for each kind of thing left out.
     """
 
     content: dict[str, Any]
@@ -105,101 +114,101 @@ class Payload:
 
 
 def payload(
-    folded: Floats,
-    unfolded: Floats,
-    columns: Mapping[str, ArrayLike],
+    body: ReportBody,
     *,
-    rows: Ints,
-    neighbours: Ints | None,
     holes: CarriedHoles | None = None,
     view: ViewOptions | None = None,
     unit: str = "",
-    total: int | None = None,
 ) -> Payload:
     """Return what the viewer draws.
 
     Parameters
     ----------
-    folded, unfolded : (n, 3) float
-        The blocks in both spaces; finite.
-    columns : mapping of str to (n,)
-        Everything that is known of them.
-    rows : (n,) int
-        Their data rows in the input, from 1.
-    neighbours : (n, m) int, optional
-        Rows of each block's neighbours, which shape the unfolded blocks.
+    body : ReportBody
+        The blocks and their columns.
     holes : CarriedHoles, optional
         Drill-holes carried with the body.
     view : ViewOptions, optional
-        Where the body is looked at from at first.
+        The viewer's direction at the start.
     unit : str, optional
         The coordinates' unit.
-    total : int, optional
-        Blocks of the body, those without an image included.
     """
     view = view or ViewOptions()
-    form = block_shape(folded, columns)
-    outer = outer_blocks(folded, form)
+    shape = block_shape(body.folded, body.columns)
+    outer = outer_blocks(body.folded, shape)
     chosen = chosen_blocks(outer)
-    notes = []
-    shown, drawn = int(np.count_nonzero(outer)), int(np.count_nonzero(outer[chosen]))
-    if len(chosen) < len(folded):
-        notes.append(
-            f"{len(chosen):,} of {len(folded):,} blocks are held for the turning views, chosen at "
-            "random (the same ones each time), outer ones before inner ones: "
-            f"{drawn:,} of {shown:,} outer blocks"
-            f"{', drawn larger as others are missing' if drawn < shown else ''}. "
-            "Figures and distributions are of all."
-        )
-    total = len(folded) if total is None else total
-    if total > len(folded):
-        notes.append(f"{total - len(folded):,} blocks without an image are not drawn.")
-    read, left = read_columns(columns, len(folded), _INPUT, _RESULTS)
-    read.sort(key=lambda column: column.group != _RESULTS)
-    packed, coarse, dropped = _packed([column.taken(chosen) for column in read], len(chosen))
-    left += dropped
-    if left:
-        notes.append(
-            f"Columns left out, for want of room or as texts of too many kinds: {', '.join(left)}."
-        )
-    if coarse:
-        notes.append(coarse)
-    carried, told = _holes(holes, folded.min(axis=0), unfolded.min(axis=0))
-    straight, bent = (unfolded, folded) if form is None else (folded, unfolded)
-    axes = np.eye(3) if form is None else form.axes
-    turned = (
-        np.broadcast_to(np.eye(3), (len(chosen), 3, 3))
-        if neighbours is None
-        else gradients(straight, bent, neighbours, chosen)
-    )
+    columns, column_notes = _block_columns(body, chosen)
+    carried, hole_notes = _holes(holes, body.folded.min(axis=0), body.unfolded.min(axis=0))
     content = {
-        "blocks": {
-            "count": len(chosen),
-            "rows": encoded(rows[chosen], "u4"),
-            "folded": quantised_points(folded[chosen]),
-            "unfolded": quantised_points(unfolded[chosen]),
-            "gradients": {
-                "step": GRADIENT_STEP,
-                **encoded(_gradient_codes(turned @ axes.T), "i2"),
-            },
-            "sides": (block_sides(unfolded) if form is None else form.sides).tolist(),
-            "sizes": None
-            if form is None or form.sizes is None
-            else quantised_points(form.sizes[chosen]),
-            "axes": axes.T.ravel().tolist(),
-            "bent": "folded" if form is None else "unfolded",
-            "grow": math.sqrt(shown / drawn),
-            "outer": encoded(outer[chosen], "u1"),
-        },
-        "columns": packed,
+        "blocks": _blocks(body, shape, outer, chosen),
+        "columns": columns,
         "holes": carried,
         "palettes": palettes(),
         "categories": list(CATEGORIES),
         "view": {"azimuth": view.azimuth, "elevation": view.elevation},
         "unit": unit,
-        "start": _start(packed),
+        "start": _start(columns),
     }
-    return Payload(content, (*notes, *told))
+    return Payload(content, (*_block_notes(body, outer, chosen), *column_notes, *hole_notes))
+
+
+def _blocks(body: ReportBody, shape: Shape | None, outer: Bools, chosen: Ints) -> dict[str, Any]:
+    """Return the blocks drawn: positions, shapes and rows."""
+    straight, bent = body.folded, body.unfolded
+    if shape is None:
+        straight, bent = bent, straight
+    axes = np.eye(3) if shape is None else shape.axes
+    turned = (
+        np.broadcast_to(np.eye(3), (len(chosen), 3, 3))
+        if body.neighbours is None
+        else gradients(straight, bent, body.neighbours, chosen)
+    )
+    sizes = None if shape is None else shape.sizes
+    return {
+        "count": len(chosen),
+        "rows": encoded(body.rows[chosen], "u4"),
+        "folded": quantised_points(body.folded[chosen]),
+        "unfolded": quantised_points(body.unfolded[chosen]),
+        "gradients": {"step": GRADIENT_STEP, **encoded(_gradient_codes(turned @ axes.T), "i2")},
+        "sides": (block_sides(body.unfolded) if shape is None else shape.sides).tolist(),
+        "sizes": None if sizes is None else quantised_points(sizes[chosen]),
+        "axes": axes.T.ravel().tolist(),
+        "bent": "folded" if shape is None else "unfolded",
+        "grow": math.sqrt(np.count_nonzero(outer) / np.count_nonzero(outer[chosen])),
+        "outer": encoded(outer[chosen], "u1"),
+    }
+
+
+def _block_notes(body: ReportBody, outer: Bools, chosen: Ints) -> list[str]:
+    """Return one sentence for each kind of block that is not drawn."""
+    notes = []
+    count, drawn = int(np.count_nonzero(outer)), int(np.count_nonzero(outer[chosen]))
+    if len(chosen) < len(body.folded):
+        larger = ", drawn larger to fill the gaps" if drawn < count else ""
+        notes.append(
+            f"The 3-D views hold {len(chosen):,} of {len(body.folded):,} blocks, a random choice "
+            f"that is the same each time and prefers outer blocks: {drawn:,} of {count:,} outer "
+            f"blocks are held{larger}. Figures and distributions cover all blocks."
+        )
+    without = body.total - len(body.folded)
+    if without:
+        notes.append(f"{without:,} blocks without an image are not drawn.")
+    return notes
+
+
+def _block_columns(body: ReportBody, chosen: Ints) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the columns of the blocks drawn, results first, and what was left out."""
+    read, left = read_columns(body.columns, len(body.folded), _INPUT, _RESULTS)
+    read.sort(key=lambda column: column.group != _RESULTS)
+    packed, coarse, dropped = _packed([column.taken(chosen) for column in read], len(chosen))
+    left += dropped
+    notes = []
+    if left:
+        notes.append(
+            "Columns left out, for lack of room or because they hold too many different texts: "
+            f"{', '.join(left)}."
+        )
+    return packed, [*notes, coarse] if coarse else notes
 
 
 def _gradient_codes(matrices: Floats) -> Floats:
@@ -208,7 +217,7 @@ def _gradient_codes(matrices: Floats) -> Floats:
 
 
 def _start(packed: list[dict[str, Any]]) -> str:
-    """Return the column to colour by at first."""
+    """Return the column that colours the blocks at the start."""
     names = [column["name"] for column in packed]
     for name in ("stratigraphic", "nmd_error"):
         if name in names:
@@ -227,16 +236,17 @@ def palettes() -> dict[str, str]:
 
 
 def _bytes(colours: Floats) -> NDArray[np.uint8]:
+    """Return colours from 0 to 1 as bytes."""
     return np.rint(255 * np.asarray(colours)).astype(np.uint8)
 
 
 def _packed(columns: list[Column], count: int) -> tuple[list[dict[str, Any]], str, list[str]]:
-    """Return columns that fit into the room, a sentence where they are coarse, what did not fit."""
+    """Return the columns that fit, a note if values are rounded, and the names that do not fit."""
     short = 4 * count * len(columns) > _ROOM
     most = _ROOM // (2 * count) if short else len(columns)
     form = ""
     if short:
-        form = "Values of columns are kept to 1/65,534 of their range, as there are many columns."
+        form = "There are many columns, so their values are rounded to 1/65,534 of their range."
     kept, rest = columns[:most], columns[most:]
     return [c.packed(short=short) for c in kept], form, [c.name for c in rest]
 
@@ -244,7 +254,7 @@ def _packed(columns: list[Column], count: int) -> tuple[list[dict[str, Any]], st
 def _holes(
     holes: CarriedHoles | None, folded: Floats, unfolded: Floats
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return traces and samples relative to the bodies' corners, and what was left out."""
+    """Return traces and samples relative to the body's corners, and notes on what is left out."""
     out: dict[str, Any] = {}
     notes: list[str] = []
     given = {} if holes is None else {"traces": holes.traces, "samples": holes.samples}
@@ -285,7 +295,7 @@ def _hole_codes(points: CarriedPoints) -> tuple[Ints, list[str]]:
 
 
 def _kept_points(codes: Ints, *, traces: bool) -> Ints:
-    """Return which points are drawn: of too many traces every second, third ... and the ends."""
+    """Return the points drawn: of too many trace points, every k-th one and the holes' ends."""
     n = len(codes)
     if n <= MOST_POINTS:
         return np.arange(n)

@@ -1,12 +1,13 @@
-"""Still pictures of a body in both spaces, for print and for browsers that cannot draw it."""
+"""Still pictures of a body in both spaces, for print and for browsers without WebGL."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from geounfold.geometry.mesh import Floats
+from geounfold.report.blocks import block_shape, level_sides
+from geounfold.report.body import ReportBody
 from geounfold.report.columns import MEANINGS
 from geounfold.report.html_text import text
 from geounfold.report.plots.bodies import draw_bodies
@@ -19,49 +20,43 @@ if TYPE_CHECKING:
 _PICTURED = ("nmd_error", "volume_ratio", "shear")
 
 
-def pictures(
-    X: Floats,
-    Y: Floats,
-    drawn: Mapping[str, Floats],
-    distances: tuple[Floats, Floats] | None,
-    sides: Floats | None,
-    view: ViewOptions | None,
-) -> Iterator[str]:
+def pictures(body: ReportBody, view: ViewOptions | None) -> Iterator[str]:
     """Yield figures as HTML: layers, neighbour mean distances, and the main distortions.
 
     Parameters
     ----------
-    X, Y : (n, 3) float
-        The blocks in both spaces.
-    drawn : mapping of str to (n,)
-        Columns of the result.
-    distances : two of (n,), optional
-        Neighbour mean distances in both spaces.
-    sides : (n, 3), optional
-        Of the boxes drawn, where blocks differ in theirs.
+    body : ReportBody
+        The blocks and their columns.
     view : ViewOptions, optional
-        Where to look from.
+        Direction from which the body is viewed.
     """
+    X, Y, results = body.folded, body.unfolded, body.results
+    sides = level_sides(block_shape(X, body.columns))
     common: dict[str, Any] = {"sides": sides, "options": view}
-    if "stratigraphic" in drawn:
+    if "stratigraphic" in results:
         layers: dict[str, Any] = {"limits": (0.0, 1.0), "bands": 8, **common}
-        figure = draw_bodies(X, Y, drawn["stratigraphic"], "stratigraphic", **layers)
-        yield _figure(figure, "Layers: 0 at the bottom surface, 1 at the top. True to scale.")
-    if distances is not None:
+        figure = draw_bodies(X, Y, results["stratigraphic"], "stratigraphic coordinate", **layers)
+        yield _figure(
+            figure, "Stratigraphic coordinate: 0 at the bottom surface, 1 at the top. True scale."
+        )
+    if body.distances is not None:
         label = "neighbour mean distance"
-        figure = draw_bodies(X, Y, distances, label, colours="cividis", **common)
-        yield _figure(figure, "Mean distance to the neighbours in the folded body.")
+        figure = draw_bodies(X, Y, body.distances, label, colours="cividis", **common)
+        yield _figure(
+            figure, "Mean distance of each block to its neighbours in the folded body, both spaces."
+        )
     for name in _PICTURED:
-        if name in drawn:
+        if name in results:
             label, meaning, _ = MEANINGS[name]
             look: dict[str, Any] = {"colours": "cividis", **common}
             if name == "volume_ratio":
-                look |= {"colours": "RdYlBu_r", "limits": ratio_limits(drawn[name])}
-            figure = draw_bodies(X, Y, drawn[name], label, **look)
+                look |= {"colours": "RdYlBu_r", "limits": ratio_limits(results[name])}
+            figure = draw_bodies(X, Y, results[name], label, **look)
             yield _figure(figure, f"{name}: {meaning}.")
 
 
 def _figure(figure: Figure, caption: str) -> str:
+    """Return a figure with its caption as HTML."""
     data = base64.b64encode(png(figure)).decode("ascii")
     words = text(caption)
     return (

@@ -1,9 +1,12 @@
-"""The sections of the report's page."""
+"""The sections of the report, in the order of the page.
+
+Each ``*_section`` function returns one section as HTML, or an empty text if it has no content.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from string import Template
@@ -11,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from geounfold.geometry.mesh import Floats
 from geounfold.report.charts import distribution
-from geounfold.report.columns import MEANINGS
+from geounfold.report.columns import DISTRIBUTED, MEANINGS
 from geounfold.report.exploration import exploration_html
 from geounfold.report.html_text import (
     bars,
@@ -26,14 +29,10 @@ from geounfold.report.html_text import (
     table,
     text,
 )
-from geounfold.report.payload import CarriedHoles
 from geounfold.report.verdict import Verdict
 
 if TYPE_CHECKING:
     from geounfold.estimation import Exploration
-
-
-DISTRIBUTED = ("nmd_error", "volume_ratio", "shear", "stretch_max", "stretch_min")
 
 
 @cache
@@ -42,116 +41,142 @@ def asset(name: str) -> str:
     return files("geounfold.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
-def verdict_section(said: Verdict, warnings: object) -> str:
-    """Return the verdict and the warnings as HTML."""
-    told = bullets(warnings if isinstance(warnings, list | tuple) else [])
+def verdict_section(verdict: Verdict, warnings: object) -> str:
+    """Return the verdict, its reasons and the warnings."""
+    listed = bullets(warnings if isinstance(warnings, list | tuple) else [])
+    checked, doubtful = bullets(verdict.reasons), bullets(verdict.distrust)
     parts = [
-        f'<section class="verdict {said.level}" aria-label="Verdict">',
-        f'<p class="headline"><strong>{text(said.headline)}</strong></p>',
+        f'<section class="verdict {verdict.level}" aria-label="Verdict">',
+        f'<p class="headline"><strong>{text(verdict.headline)}</strong></p>',
         '<div class="columns">',
-        f"<div><h2>What was checked</h2>{bullets(said.reasons)}</div>" if said.reasons else "",
-        f"<div><h2>What to distrust</h2>{bullets(said.distrust)}</div>" if said.distrust else "",
-        f"</div><h2>Warnings</h2>{told or '<p>None.</p>'}</section>",
+        f"<div><h2>What was checked</h2>{checked}</div>" if checked else "",
+        f"<div><h2>What to check yourself</h2>{doubtful}</div>" if doubtful else "",
+        f"</div><h2>Warnings</h2>{listed or '<p>None.</p>'}</section>",
     ]
     return "".join(parts)
 
 
-def views_section(notes: tuple[str, ...], holes: CarriedHoles | None) -> str:
-    """Return the section that holds the 3-D views."""
+def views_section(notes: tuple[str, ...], *, with_holes: bool) -> str:
+    """Return the 3-D views, with notes on what they leave out."""
     return Template(asset("viewer.html")).substitute(
         notes="".join(f'<p class="soft">{text(note)}</p>' for note in notes),
-        holes="" if holes is not None else "hidden",
+        holes="" if with_holes else "hidden",
     )
 
 
-def distributions_section(drawn: Mapping[str, Floats]) -> Iterator[str]:
-    """Yield the sections that show how the distortion figures are distributed."""
+def stills_section(pictures: Iterable[str]) -> str:
+    """Return the still pictures, folded up."""
+    return folded_up("Still pictures", "\n".join(pictures), "stills")
+
+
+_FIGURES: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
+    ("inverted_folded", "inverted tetrahedra, folded", number),
+    ("inverted_unfolded", "inverted tetrahedra, unfolded", number),
+    ("injective", "proved one-to-one", number),
+    ("outside_share", "blocks outside the control mesh", lambda v: f"{v:.3%}"),
+    ("round_trip_max", "round trip, largest error (input's unit)", number),
+    ("nmd.mean", "change of neighbour distances, mean", lambda v: f"{v:.2%}"),
+    ("nmd.p95", "change of neighbour distances, 95th percentile", lambda v: f"{v:.2%}"),
+    ("volume_change.mean", "change of volume, mean", lambda v: f"{v:.2%}"),
+    ("edge_change.mean", "change of the mesh's edge lengths, mean", lambda v: f"{v:.2%}"),
+    ("shear.max", "shear, largest", number),
+    ("peak_memory_mb", "peak memory, MiB", lambda v: f"{v:,.0f}"),
+)
+
+
+def figures_section(summary: Mapping[str, Any]) -> str:
+    """Return the main figures as a row of tiles."""
+    values = flat(summary)
+    tiles = [
+        f'<div class="tile"><b>{text(write(values[key]))}</b>{text(label)}</div>'
+        for key, label, write in _FIGURES
+        if values.get(key) is not None
+    ]
+    seconds = [v for v in flat(summary.get("seconds", {})).values() if isinstance(v, int | float)]
+    if seconds:
+        tiles.append(f'<div class="tile"><b>{sum(seconds):.2f}</b>seconds, all stages</div>')
+    return section("Figures", f'<div class="tiles">{"".join(tiles)}</div>' if tiles else "")
+
+
+def distributions_section(results: Mapping[str, Floats]) -> str:
+    """Return the distribution of each distortion over the blocks."""
+    parts = []
     for name in DISTRIBUTED:
-        if name in drawn:
+        if name in results:
             label, meaning, _ = MEANINGS[name]
-            charts = distribution(drawn[name], label)
-            yield f'<h3>{text(name)}</h3><p class="soft">{text(meaning)}</p>{charts}'
+            charts = distribution(results[name], label)
+            parts.append(f'<h3>{text(name)}</h3><p class="soft">{text(meaning)}</p>{charts}')
+    return section("Distributions over the blocks", "\n".join(parts))
 
 
-def explored_section(exploration: Exploration | None) -> str:
-    """Return the section about the samples' grades; empty if there are none."""
+def exploration_section(exploration: Exploration | None) -> str:
+    """Return the exploratory data analysis of the samples' grade."""
     if exploration is None:
         return ""
-    return section(
-        f"Exploratory data analysis of {exploration.grade}", exploration_html(exploration)
-    )
-
-
-_CERTIFIED = {
-    "injective": "proved one to one",
-    "tetrahedra": "tetrahedra examined",
-    "boundary_faces": "faces of the border",
-    "glued": "glued face to face",
-    "inverted_folded": "inverted or flat, folded",
-    "inverted_unfolded": "inverted or flat, unfolded",
-    "crossing_folded": "crossing border faces, folded",
-    "crossing_unfolded": "crossing border faces, unfolded",
-    "nested_folded": "shells within shells, folded",
-    "nested_unfolded": "shells within shells, unfolded",
-    "faulty_elements": "elements at fault",
-    "blocks_in_faulty_elements": "blocks in them",
-    "theorem": "by the theorem",
-}
-
-
-def certificate_section(summary: Mapping[str, Any]) -> str:
-    """Return what the certificate proves, as HTML."""
-    known = mapping(summary.get("certificate"))
-    return pairs({label: known[key] for key, label in _CERTIFIED.items() if key in known})
+    title = f"Exploratory data analysis of {exploration.grade}"
+    return section(title, exploration_html(exploration))
 
 
 def flaws_section(summary: Mapping[str, Any]) -> str:
-    """Return one row per element that keeps the map from being proved, those with blocks first."""
-    flaws = mapping(summary.get("certificate")).get("flaws") or []
+    """Return one row per tetrahedron that keeps the map from being proved."""
     rows = [
         {
-            "element": flaw["element"],
+            "tetrahedron": flaw["element"],
             "blocks": flaw["blocks"],
             "folded": ", ".join(number(x) for x in flaw["folded"]),
             "unfolded": ", ".join(number(x) for x in flaw["unfolded"]),
         }
-        for flaw in flaws
+        for flaw in mapping(summary.get("certificate")).get("flaws") or []
     ]
-    return table(rows) if rows else ""
+    return section("Tetrahedra at fault", table(rows))
+
+
+_CROSSCHECK = (
+    "The control mesh of prisms beside other meshes of its border; lengths in blocks. Each mesh is "
+    "unfolded by its border alone: the border follows the map, and the inside is harmonic or as "
+    "rigid as possible. The columns rms, p95 and max give the distance of the blocks from where "
+    "the map puts them; rms_same_interior gives their distance from where the control mesh, "
+    "unfolded by the same rule, puts them."
+)
 
 
 def crosscheck_section(summary: Mapping[str, Any]) -> str:
-    """Return other meshes of the control mesh's border, and where they place the blocks."""
+    """Return figures of other meshes of the control mesh's border."""
     found = mapping(summary.get("crosscheck"))
-    meshes, places = (
-        [_told(row, left_out) for row in found.get(key) or []]
-        for key, left_out in (("meshes", ("boundary_volume",)), ("places", ("worst", "seconds")))
-    )
+    meshes = [_without(row, ("boundary_volume",)) for row in found.get("meshes") or []]
+    places = [_without(row, ("worst", "seconds")) for row in found.get("places") or []]
     tables = table(meshes) + table(places)
-    words = (
-        "The control mesh of prisms against other meshes of its border; lengths in blocks. Where "
-        "the border alone follows the map and the inside is harmonic or as rigid as possible, "
-        "blocks lie rms, p95 and max from where the map places them, and rms_same_interior from "
-        "where the control mesh with such an inside does."
-    )
-    return f'<p class="soft">{words}</p>\n{tables}' if tables else ""
+    words = f'<p class="soft">{_CROSSCHECK}</p>\n{tables}' if tables else ""
+    return section("Cross-check of meshes", words)
 
 
-def _told(row: Mapping[str, Any], left_out: tuple[str, ...]) -> dict[str, Any]:
-    """Return a row without columns that say nothing."""
+def _without(row: Mapping[str, Any], left_out: tuple[str, ...]) -> dict[str, Any]:
+    """Return a row without some columns and without missing values."""
     return {k: v for k, v in row.items() if k not in left_out and v is not None and v != ""}
 
 
-def drillholes_section(summary: Mapping[str, Any]) -> str:
-    """Return what was read of drill-holes, and what was found in their tables."""
-    holes = mapping(summary.get("drillholes"))
-    plain = {k.replace("_", " "): v for k, v in holes.items() if not isinstance(v, list | Mapping)}
-    for name in ("samples", "traces"):
-        counts = {f"{name}, {k}": v for k, v in mapping(holes.get(name)).items()}
-        plain |= counts
-    plain.pop("findings total", None)
-    findings = [dict(found) for found in holes.get("findings") or [] if isinstance(found, Mapping)]
-    return pairs(plain) + (f"<h3>Found in the tables</h3>{table(findings)}" if findings else "")
+_CERTIFICATE = {
+    "injective": "proved one-to-one",
+    "tetrahedra": "tetrahedra checked",
+    "boundary_faces": "border faces checked",
+    "glued": "tetrahedra glued face to face",
+    "inverted_folded": "inverted or flat tetrahedra, folded",
+    "inverted_unfolded": "inverted or flat tetrahedra, unfolded",
+    "crossing_folded": "pairs of border faces that cross, folded",
+    "crossing_unfolded": "pairs of border faces that cross, unfolded",
+    "nested_folded": "parts of the border inside out, folded",
+    "nested_unfolded": "parts of the border inside out, unfolded",
+    "faulty_elements": "tetrahedra at fault",
+    "blocks_in_faulty_elements": "blocks in tetrahedra at fault",
+    "theorem": "theorem",
+}
+
+
+def certificate_section(summary: Mapping[str, Any]) -> str:
+    """Return what was checked to prove the map one-to-one."""
+    known = mapping(summary.get("certificate"))
+    rows = {label: known[key] for key, label in _CERTIFICATE.items() if key in known}
+    return section("Certificate", pairs(rows))
 
 
 _MADE = {
@@ -164,81 +189,75 @@ _MADE = {
     "hull.blocks_volume": "volume of the blocks",
     "control_mesh.vertices": "vertices of the control mesh",
     "control_mesh.tetrahedra": "tetrahedra of the control mesh",
-    "control_mesh.volume_folded": "its volume, folded",
-    "control_mesh.volume_unfolded": "its volume, unfolded",
-    "outside.reach": "reach around the control mesh",
+    "control_mesh.volume_folded": "volume of the control mesh, folded",
+    "control_mesh.volume_unfolded": "volume of the control mesh, unfolded",
+    "outside.reach": "extrapolation reaches from the control mesh",
+}
+_METHOD = {
+    "merged": "blocks merged along each axis",
+    "rung": "control mesh, repair used",
+    "rungs": "control mesh, repairs tried",
+    "roughness": "roughness of the mid surface",
+    "smoothing": "smoothing of the mid surface",
+    "accepted_samples": "share of samples that the mid surface fits",
+    "sharpened": "top and bottom sharpened by",
+    "layers_follow": "layers parallel to",
 }
 
 
-def making_section(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is known of the stages, by plain names; lengths in the input's unit."""
+def making_section(summary: Mapping[str, Any]) -> str:
+    """Return the figures of the stages; lengths in the input's unit."""
     known = flat(summary)
     out = {label: known[key] for key, label in _MADE.items() if known.get(key) is not None}
-    method = {k.replace("_", " "): v for k, v in mapping(summary.get("method")).items()}
-    rungs = method.pop("rungs", None)
-    if isinstance(rungs, list | tuple):
-        method["rungs tried"] = ", ".join(str(mapping(rung).get("name", rung)) for rung in rungs)
-    return out | {k: v for k, v in method.items() if v not in ("", None)}
+    for key, value in mapping(summary.get("method")).items():
+        if isinstance(value, list | tuple):
+            value = ", ".join(str(mapping(one).get("name", one)) for one in value)
+        if value not in ("", None):
+            out[_METHOD.get(key, key.replace("_", " "))] = value
+    return section("How it was made", pairs(out))
+
+
+def drillholes_section(summary: Mapping[str, Any]) -> str:
+    """Return the counts of drill-holes and the findings in their tables."""
+    holes = mapping(summary.get("drillholes"))
+    counts = {k.replace("_", " "): v for k, v in holes.items() if not isinstance(v, list | Mapping)}
+    for name in ("samples", "traces"):
+        counts |= {f"{name}, {k}": v for k, v in mapping(holes.get(name)).items()}
+    counts.pop("findings total", None)
+    findings = [dict(found) for found in holes.get("findings") or [] if isinstance(found, Mapping)]
+    listed = f"<h3>Findings in the tables</h3>{table(findings)}" if findings else ""
+    return section("Drill-holes", pairs(counts) + listed)
+
+
+def seconds_section(summary: Mapping[str, Any]) -> str:
+    """Return the seconds of each stage."""
+    times = flat(summary.get("seconds", {}))
+    known = {k: float(v) for k, v in times.items() if isinstance(v, int | float)}
+    return section("Seconds per stage", bars(known, "seconds"))
 
 
 def surfaces_section(summary: Mapping[str, Any]) -> str:
-    """Return one row per flattened surface: its size, and how its flattening went."""
+    """Return one row per flattened surface: its size and its flattening."""
     rows = []
     for name, how in mapping(summary.get("flattening")).items():
         size = mapping(summary.get(name))
         rows.append({"surface": name, **size, **{k: v for k, v in mapping(how).items() if v}})
         rows[-1].update({k: mapping(how).get(k) for k in ("flips", "overlaps")})
-    return table(rows)
-
-
-def seconds_section(summary: Mapping[str, Any]) -> str:
-    """Return the seconds per stage as a table."""
-    times = flat(summary.get("seconds", {}))
-    return bars({k: float(v) for k, v in times.items() if isinstance(v, int | float)}, "seconds")
+    return section("Flattened surfaces", table(rows))
 
 
 def repeat_section(summary: Mapping[str, Any]) -> str:
-    """Return the command and the options that repeat a run; else the options alone."""
+    """Return the command line and the options that repeat the run."""
     command, config = summary.get("command"), summary.get("config")
     parts = [
         copyable("command", "Command line (files without their folders)", str(command or "")),
-        copyable("config", "All options, for --config", str(config or "")),
+        copyable("config", "All options, as a file for --config", str(config or "")),
+        folded_up("Options as a table", pairs(flat(mapping(summary.get("options"))))),
     ]
-    options = flat(mapping(summary.get("options")))
-    parts.append(folded_up("Options as a table", pairs(options)))
-    return "".join(parts)
+    return section("Repeat this run", "".join(parts))
 
 
 def everything_section(summary: Mapping[str, Any]) -> str:
-    """Return the summary as JSON; nothing that a report holds is kept from being read."""
+    """Return the whole summary as JSON, folded up."""
     shown = json.dumps(summary, indent=1, default=str)
-    return f'<pre tabindex="0">{text(shown)}</pre>'
-
-
-_TILES: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
-    ("inverted_folded", "inverted, folded", number),
-    ("inverted_unfolded", "inverted, unfolded", number),
-    ("injective", "proved one to one", number),
-    ("outside_share", "blocks outside", lambda v: f"{v:.3%}"),
-    ("round_trip_max", "round trip, largest", number),
-    ("nmd.mean", "epsilon(X, Y), mean", number),
-    ("nmd.p95", "epsilon(X, Y), 95\u00a0%", number),
-    ("volume_change.mean", "volume change, mean", number),
-    ("edge_change.mean", "edge change, mean", number),
-    ("shear.max", "shear, largest", number),
-    ("peak_memory_mb", "peak memory, MiB", lambda v: f"{v:,.0f}"),
-)
-
-
-def tiles_section(summary: Mapping[str, Any]) -> str:
-    """Return the row of headline figures."""
-    values = flat(summary)
-    tiles = [
-        f'<div class="tile"><b>{text(write(values[key]))}</b>{text(label)}</div>'
-        for key, label, write in _TILES
-        if values.get(key) is not None
-    ]
-    seconds = [v for v in flat(summary.get("seconds", {})).values() if isinstance(v, int | float)]
-    if seconds:
-        tiles.append(f'<div class="tile"><b>{sum(seconds):.2f}</b>seconds, all stages</div>')
-    return f'<div class="tiles">{"".join(tiles)}</div>' if tiles else ""
+    return folded_up("The whole summary, as JSON", f'<pre tabindex="0">{text(shown)}</pre>')

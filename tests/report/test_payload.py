@@ -14,6 +14,7 @@ from geounfold.quality.neighbour_distances import NEIGHBOURS, neighbours
 from geounfold.report import CarriedHoles, CarriedPoints, report_html
 from geounfold.report.arrays import quantised, quantised_points
 from geounfold.report.blocks import LIMIT, block_shape, chosen_blocks, gradients, outer_blocks
+from geounfold.report.body import ReportBody
 from geounfold.report.charts import distribution, nice_ticks
 from geounfold.report.columns import MOST_CATEGORIES, read_columns
 from geounfold.report.html_text import json_for_script
@@ -43,10 +44,11 @@ def rolled(points: Floats, radius: float) -> Floats:
     return np.column_stack([r * np.sin(angle), points[:, 1], r * np.cos(angle)])
 
 
-def packed(X: Floats, Y: Floats, columns=None, **options) -> Payload:
+def packed(X: Floats, Y: Floats, columns=None, total: int | None = None, **options) -> Payload:
     ids = neighbours(X) if len(X) > NEIGHBOURS else None
     rows = np.arange(1, len(X) + 1)
-    return payload(X, Y, columns or {}, rows=rows, neighbours=ids, **options)
+    body = ReportBody(X, Y, rows, total or len(X), columns or {}, {}, ids, None)
+    return payload(body, **options)
 
 
 # ------------------------------------------------------------------------------------------ arrays

@@ -51,7 +51,7 @@ def draw_body(
     return figure
 
 
-def draw_bodies(
+def draw_bodies(  # 10 arguments: what is drawn, and its look by keyword as in matplotlib
     folded: Floats,
     unfolded: Floats,
     values: Floats | tuple[Floats, Floats],

@@ -1,6 +1,7 @@
 """Pictures of a cross-check: cuts through meshes of tetrahedra, and figures side by side.
 
-Flat drawings by matplotlib, which need no rendering; see `plotting` for what the functions return.
+Flat drawings by matplotlib, which need no rendering.  Every ``draw_`` function returns a Figure
+that belongs to no window.
 """
 
 from __future__ import annotations

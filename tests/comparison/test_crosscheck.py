@@ -16,36 +16,23 @@ from geounfold.comparison.crosscheck._places import Carrier, Follower, border_pl
 from geounfold.errors import MissingDependencyError, OptionError
 from geounfold.geometry.measures import boundary_faces, tet_volumes
 from geounfold.geometry.mesh import TetMesh, TriMesh
-from geounfold.geometry.prisms import prism_tets
 from geounfold.mapping.control_mesh import ControlMesh
+from tests.shapes import rotation, slab
 
 TETGEN = find_spec("tetgen") is not None
 needs_tetgen = pytest.mark.skipif(not TETGEN, reason="TetGen (extra tetgen) is not installed")
 MESHERS = ["tetwild", pytest.param("tetgen", marks=needs_tetgen)]
 OPTIONS = CrossCheckOptions()
-RNG = np.random.default_rng(11)
-
-
-def slab(nx, ny, nz, size):
-    """Return a box of prisms, (V, T), from (0, 0, 0) to size."""
-    i, j = (a.ravel() for a in np.indices((nx + 1, ny + 1)))
-    k = np.arange(len(i)).reshape(nx + 1, ny + 1)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    T = prism_tets(F, len(i), nz + 1)
-    layers = [np.column_stack([i / nx, j / ny, np.full(len(i), z / nz)]) for z in range(nz + 1)]
-    return np.concatenate(layers) * size, T
 
 
 def control(folded, unfolded, T):
     return ControlMesh(TetMesh(folded, T), TetMesh(unfolded, T), np.zeros(len(folded)))
 
 
-BOX, BOX_T = slab(8, 6, 4, np.array([16.0, 12.0, 6.0]))
+BOX, BOX_T = slab(8, 6, 4, (2.0, 2.0, 1.5))
 SURFACE = border(TetMesh(BOX, BOX_T))
 LINEAR = np.array([[0.9, 0.2, 0.1], [-0.1, 1.1, 0.0], [0.05, 0.0, 1.0]])
-TURN, _ = np.linalg.qr(RNG.normal(size=(3, 3)))
-TURN = TURN * np.sign(np.linalg.det(TURN))
+TURN = rotation(11)
 
 
 @pytest.fixture(scope="module")
@@ -73,13 +60,14 @@ def test_meshers_fill_a_box_with_upright_tetrahedra(filled, name):
 @pytest.mark.parametrize("name", [PRISM, *MESHERS])
 @pytest.mark.parametrize("interior", ["harmonic", "arap"])
 def test_insides_follow_a_motion_and_harmonic_ones_a_linear_map(filled, name, interior):
+    rng = np.random.default_rng(11)
     # Linear maps are harmonic, and the cotangent Laplacian is exact on them; motions have no
     # energy.  A border within the envelope goes with the closest place: 0.1 off at most.
     matrix = LINEAR if interior == "harmonic" else TURN
     image = BOX @ matrix.T + [3.0, -2.0, 1.0]
     mesh = TetMesh(BOX, BOX_T) if name == PRISM else filled[name]
     unfolded, _ = Follower(mesh, control(BOX, image, BOX_T)).unfolded(interior)
-    points = RNG.uniform([1, 1, 1], [15, 11, 5], size=(500, 3))
+    points = rng.uniform([1, 1, 1], [15, 11, 5], size=(500, 3))
     carrier = Carrier(mesh, points)
     assert carrier.found.all()
     off = np.linalg.norm(carrier.carry(unfolded) - points @ matrix.T - [3.0, -2.0, 1.0], axis=1)
@@ -92,7 +80,7 @@ def test_harmonic_heights_in_a_bend_are_logarithmic():
     # A bend of radii 6 to 14 unfolded by flexural slip, height r - 10.  The harmonic height is
     # 8 ln(r / 6) / ln(14 / 6) - 4, 0.82 above the true one at r = 10, away from the rims: what
     # a harmonic inside differs by, whatever the mesh.
-    V, T = slab(32, 24, 16, np.array([4.0, 30.0, 8.0]))
+    V, T = slab(32, 24, 16, (0.125, 1.25, 0.5))
     r, angle = V[:, 2] + 6, V[:, 0] - 2
     folded = np.column_stack([r * np.sin(angle), V[:, 1], r * np.cos(angle)])
     flat = np.column_stack([r * angle, V[:, 1], r - 10])
@@ -116,7 +104,7 @@ def test_border_places_are_those_of_the_map():
 
 
 def test_a_mesh_without_inner_vertices_is_its_border():
-    V, T = slab(2, 2, 1, np.array([2.0, 2.0, 1.0]))
+    V, T = slab(2, 2, 1)
     image = V @ LINEAR.T
     for interior in ("harmonic", "arap"):
         found, _ = Follower(TetMesh(V, T), control(V, image, T)).unfolded(interior)
@@ -244,12 +232,13 @@ def test_a_mesher_that_is_not_installed_is_named(unfolding, monkeypatch):
 
 @needs_tetgen
 def test_runs_repeat_and_rows_order_changes_nothing(body, unfolding):
+    rng = np.random.default_rng(11)
     chosen = {"meshers": "tetgen", "interiors": "harmonic"}
     once, again = (gu.crosscheck(unfolding, **chosen) for _ in range(2))
     assert once.differences["tetgen_harmonic"].tobytes() == (
         again.differences["tetgen_harmonic"].tobytes()
     )
-    order = RNG.permutation(len(body))
+    order = rng.permutation(len(body))
     mixed = gu.crosscheck(gu.unfold(body[order]), **chosen)
     # Bodies with a lattice unfold alike to 1e-9 of the size, 30 blocks, in any order; TetGen
     # may answer that with other tetrahedra, whose own effect is 0.005 blocks.

@@ -39,11 +39,10 @@ from geounfold.synthetic import GradeField, drill
 
 pytest.importorskip("gstlearn", reason="the extra geostat is not installed")
 
-RNG = np.random.default_rng(5)
-POINTS = RNG.random((300, 3)) * [100.0, 100.0, 20.0]
-VALUES = RNG.normal(2.0, 1.0, 300)
-HOLES = RNG.integers(0, 30, 300)
-TARGETS = RNG.random((40, 3)) * [100.0, 100.0, 20.0]
+POINTS = np.random.default_rng(5).random((300, 3)) * [100.0, 100.0, 20.0]
+VALUES = np.random.default_rng(6).normal(2.0, 1.0, 300)
+HOLES = np.random.default_rng(7).integers(0, 30, 300)
+TARGETS = np.random.default_rng(8).random((40, 3)) * [100.0, 100.0, 20.0]
 WIDE = Neighbourhood(radii=(80.0, 80.0, 16.0), max_samples=12)
 
 
@@ -130,9 +129,10 @@ def test_the_unit_of_grades_and_lengths_does_not_matter() -> None:
 
 
 def test_row_order_changes_no_bit_and_workers_neither(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
     near = Neighbourhood(radii=(80, 80, 16), max_samples=8, max_per_hole=2)
     a = krige(POINTS, VALUES, TARGETS, model("spherical"), near, holes=HOLES)
-    p, t = RNG.permutation(300), RNG.permutation(40)
+    p, t = rng.permutation(300), rng.permutation(40)
     b = krige(POINTS[p], VALUES[p], TARGETS[t], model("spherical"), near, holes=HOLES[p])
     assert np.array_equal(b.estimate, a.estimate[t])
     assert np.array_equal(b.variance, a.variance[t])
@@ -169,10 +169,11 @@ def brute(near: Neighbourhood, target: np.ndarray, own: int) -> list[int]:
 @pytest.mark.parametrize("per_hole", [None, 1, 3])
 @pytest.mark.parametrize("radius", [15.0, 400.0])
 def test_search_takes_the_nearest_of_each_hole(per_hole: int | None, radius: float) -> None:
+    rng = np.random.default_rng(5)
     near = Neighbourhood(
         radii=(radius, radius, radius / 4), max_samples=20, max_per_hole=per_hole, min_samples=1
     )
-    own = RNG.integers(-1, 30, len(TARGETS))
+    own = rng.integers(-1, 30, len(TARGETS))
     found = Search(POINTS, HOLES, near).find(TARGETS, own)
     for k, target in enumerate(TARGETS):
         assert found.rows[k, : found.counts[k]].tolist() == brute(near, target, own[k])
@@ -227,8 +228,9 @@ def test_the_fit_finds_the_ranges_of_a_field(kind: str) -> None:
 
 
 def test_the_fit_does_not_depend_on_row_order() -> None:
+    rng = np.random.default_rng(5)
     values = GradeField("spherical", (40, 40, 8), seed=2).at(POINTS)
-    p = RNG.permutation(300)
+    p = rng.permutation(300)
     a, b = fit_variogram(POINTS, values), fit_variogram(POINTS[p], values[p])
     assert a.model == b.model
 

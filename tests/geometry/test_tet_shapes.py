@@ -9,7 +9,6 @@ from geounfold.geometry.tet_shapes import dihedral_angles, radius_ratios
 
 REGULAR = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 UPRIGHT = np.array([[1, 0, 2, 3]])
-RNG = np.random.default_rng(5)
 
 
 def test_regular_tetrahedra_have_equal_angles_and_ratio_one():
@@ -41,8 +40,9 @@ def test_a_cubes_corner_has_known_spheres():
 
 
 def test_shape_knows_neither_place_turn_nor_size():
-    V, T = RNG.normal(size=(40, 3)), RNG.permuted(np.tile(np.arange(40), (9, 1)), axis=1)[:, :4]
-    turn, _ = np.linalg.qr(RNG.normal(size=(3, 3)))
+    rng = np.random.default_rng(5)
+    V, T = rng.normal(size=(40, 3)), rng.permuted(np.tile(np.arange(40), (9, 1)), axis=1)[:, :4]
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     moved = 7.5 * V @ turn.T + [4e5, 7e6, 100]
     # 1e-6: coordinates of 7e6 with elements of size 7 leave ten digits of each edge.

@@ -13,7 +13,6 @@ from geounfold.methods.sheet.meshing import build
 from geounfold.methods.sheet.meshing.build import ControlOptions
 from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS
 
-RNG = np.random.default_rng(5)
 NONE = np.empty(0, np.int64)
 
 
@@ -63,21 +62,23 @@ def test_a_bent_slab_is_proved():
 
 @pytest.mark.parametrize("closed", [False, True])
 def test_tetrahedra_that_wind_round_twice_are_all_upright_and_not_proved(closed):
+    rng = np.random.default_rng(5)
     # 24 wedges of 25 or 30 degrees make 600 or 720 degrees.
     V, T = wound(600 / 360 if not closed else 2.0, 24, closed)
     assert (tet_volumes(V, T) > 0).all()
     flaws = examine(V, Gluing.of(T))
     assert not len(flaws.inverted)
     assert len(flaws.crossing)
-    points = V.mean(axis=0) + RNG.uniform(-0.6, 0.6, (400, 3)) * [1, 1, 0.5]
+    points = V.mean(axis=0) + rng.uniform(-0.6, 0.6, (400, 3)) * [1, 1, 0.5]
     assert holding(V, T, points).max() == 2
     assert not certify(control(V, V, T), None, NONE).injective
 
 
 def test_what_winds_round_once_is_proved():
+    rng = np.random.default_rng(5)
     V, T = wound(340 / 360, 24)
     assert examine(V, Gluing.of(T)).none
-    points = V.mean(axis=0) + RNG.uniform(-0.6, 0.6, (400, 3)) * [1, 1, 0.5]
+    points = V.mean(axis=0) + rng.uniform(-0.6, 0.6, (400, 3)) * [1, 1, 0.5]
     assert holding(V, T, points).max() == 1
 
 
@@ -138,6 +139,7 @@ def test_upright_prisms_may_overlap_at_an_inner_hinge():
     In early trials 8 blocks of a real body lay in two tetrahedra at an inner hinge, every volume
     positive in both spaces.  Here it is a hinge of radius 42 at a half-thickness of 40.
     """
+    rng = np.random.default_rng(5)
     body = gu.simulate("sharp_hinge")
     u = gu.unfold(body.folded)
     assert u.certificate.injective
@@ -153,7 +155,7 @@ def test_upright_prisms_may_overlap_at_an_inner_hinge():
     flaws = examine(V, gluing := Gluing.of(T))
     assert len(flaws.crossing)
     near = V[T[flaws.elements(gluing)]]
-    share = RNG.dirichlet(np.ones(4), (len(near), 40))
+    share = rng.dirichlet(np.ones(4), (len(near), 40))
     inner = np.einsum("mij,mjk->mik", share, near).reshape(-1, 3)
     assert holding(V, T, inner).max() == 2
 
@@ -165,11 +167,12 @@ def _laid_flat(mesh, start):
 @pytest.mark.parametrize("case", ["sim_case_1", "hole"])
 def test_the_certificate_agrees_with_brute_force(case):
     """Points of every element's inside lie in that element alone, in both spaces."""
+    rng = np.random.default_rng(5)
     u = gu.unfold(gu.simulate(case, blocks=4000).folded)
     assert u.certificate.injective
     T = u.map.whole.folded.T
-    chosen = RNG.choice(len(T), 60, replace=False)
-    share = RNG.dirichlet(np.ones(4), len(chosen))
+    chosen = rng.choice(len(T), 60, replace=False)
+    share = rng.dirichlet(np.ones(4), len(chosen))
     for space in (u.map.whole.folded, u.map.whole.unfolded):
         points = np.einsum("ij,ijk->ik", share, space.V[T[chosen]])
         assert (holding(space.V, T, points) == 1).all()

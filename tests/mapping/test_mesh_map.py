@@ -6,26 +6,17 @@ import pytest
 from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import TetMesh
-from geounfold.geometry.prisms import prism_tets
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.mesh_map import UnfoldingMap, load
+from tests.shapes import rotation, slab
 
-RNG = np.random.default_rng(8)
-TURN, _ = np.linalg.qr(RNG.normal(size=(3, 3)))
-TURN = TURN * np.sign(np.linalg.det(TURN))
-FRAME = Frame(np.array([431_000.0, 7_400_000.0, 900.0]), TURN, 12.5, None)
+FRAME = Frame(np.array([431_000.0, 7_400_000.0, 900.0]), rotation(8), 12.5, None)
 
 
 def make_map():
     """A sheared 8 x 8 x 2 prism mesh in working units."""
-    n = 9
-    i, j = (a.ravel() for a in np.indices((n, n)))
-    k = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    T = prism_tets(F, n * n, 3)
-    layers = [np.column_stack([i, j, np.full(n * n, z)]) for z in (-1.0, 0.0, 1.0)]
-    flat = np.concatenate(layers).astype(float)
+    flat, T = slab(8, 8, 2)
+    flat -= [0.0, 0.0, 1.0]
     folded = flat + np.column_stack([0.1 * flat[:, 2], np.zeros(len(flat)), np.sin(flat[:, 0] / 3)])
     return UnfoldingMap(
         FRAME, ControlMesh(TetMesh(folded, T), TetMesh(flat, T), (flat[:, 2] + 1) / 2)
@@ -33,7 +24,8 @@ def make_map():
 
 
 def inner_points(count=500):
-    flat = RNG.random((count, 3)) * [8.0, 8.0, 2.0] - [0.0, 0.0, 1.0]
+    rng = np.random.default_rng(8)
+    flat = rng.random((count, 3)) * [8.0, 8.0, 2.0] - [0.0, 0.0, 1.0]
     return flat * FRAME.scale
 
 

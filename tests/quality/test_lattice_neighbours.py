@@ -10,13 +10,12 @@ from geounfold.quality import lattice_neighbours
 from geounfold.quality.lattice_neighbours import lattice_nmd, offsets_by_length
 from geounfold.quality.neighbour_distances import epsilon, lattice_epsilon, neighbours, nmd
 
-RNG = np.random.default_rng(4)
-
 
 def ragged(shape=(14, 12, 9), share=0.7):
     """Cells of a box with holes, in random order."""
+    rng = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3)
-    return RNG.permutation(cells[RNG.random(len(cells)) < share]) - 5
+    return rng.permutation(cells[rng.random(len(cells)) < share]) - 5
 
 
 @pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.6, 1.6, 0.4), (1.1, 0.7, 1.3)])
@@ -51,11 +50,12 @@ def test_sheets_and_rows_of_one_block(shape):
 
 
 def test_neither_rows_nor_slices_nor_threads_change_a_bit(monkeypatch):
+    rng = np.random.default_rng(4)
     cells, sides = ragged(), np.array([1.0, 1.0, 0.5])
     A = cells * sides
     B = A + np.sin(A[:, ::-1])
     whole = lattice_epsilon(A, B, cells, sides, 26)
-    order = RNG.permutation(len(A))
+    order = rng.permutation(len(A))
     monkeypatch.setattr(lattice_neighbours, "_SLICE", 100)
     for count in (1, 3):
         monkeypatch.setattr(threads, "cores", lambda count=count: count)

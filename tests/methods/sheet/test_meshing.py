@@ -14,11 +14,10 @@ from geounfold.methods.sheet.meshing.top_and_bottom import Horizons
 from geounfold.methods.sheet.mid_surface.spline import SplineGrid
 from geounfold.surfaces.given import split_reference
 
-RNG = np.random.default_rng(2)
-
 
 def test_datums_level_their_surface():
-    bottom, top = RNG.uniform(-4, -2, 20), RNG.uniform(1, 5, 20)
+    rng = np.random.default_rng(2)
+    bottom, top = rng.uniform(-4, -2, 20), rng.uniform(1, 5, 20)
     assert np.array_equal(Datum("mid", -3, 3).z(top, bottom, top), top)
     assert np.allclose(Datum("top", -3, 3).z(top, bottom, top), 3)
     assert np.allclose(Datum("bottom", -3, 3).z(bottom, bottom, top), -3)
@@ -36,10 +35,11 @@ def test_an_unknown_datum_is_refused():
 
 
 def test_registration_finds_the_motion_and_never_mirrors():
-    A = RNG.normal(size=(40, 2))
+    rng = np.random.default_rng(2)
+    A = rng.normal(size=(40, 2))
     turn = np.array([[np.cos(1.1), -np.sin(1.1)], [np.sin(1.1), np.cos(1.1)]])
     B = A @ turn.T + [5.0, -3.0]
-    weight = RNG.uniform(0.1, 1, 40)
+    weight = rng.uniform(0.1, 1, 40)
     assert np.allclose(register(A, B, weight), B)
     mirrored = A * [1, -1]
     moved, face = register(mirrored, A, weight), np.array([[0, 1, 2]])
@@ -47,7 +47,8 @@ def test_registration_finds_the_motion_and_never_mirrors():
 
 
 def test_footprint_holds_every_foot_inside_its_border():
-    U = RNG.uniform(-20, 20, (800, 2))
+    rng = np.random.default_rng(2)
+    U = rng.uniform(-20, 20, (800, 2))
     prints = footprint(U, 0.4, 1.5, 1)
     # Counter-clockwise halves of square cells.
     assert triangle_areas(prints.U, prints.F) == pytest.approx(np.full(len(prints.F), 1.5**2 / 2))
@@ -59,7 +60,8 @@ def test_footprint_holds_every_foot_inside_its_border():
 
 def bent_layers(radius, reach):
     """Prisms over a cylinder of a radius, bent so that normals meet above."""
-    U = footprint(RNG.uniform(-6, 6, (900, 2)), 0.0, 1.0, 0)
+    rng = np.random.default_rng(2)
+    U = footprint(rng.uniform(-6, 6, (900, 2)), 0.0, 1.0, 0)
     angle = U.U[:, 0] / radius
     P = np.column_stack([radius * np.sin(angle), U.U[:, 1], radius * (1 - np.cos(angle))])
     normal = np.column_stack([-np.sin(angle), np.zeros(len(P)), np.cos(angle)])
@@ -89,10 +91,11 @@ def test_offsets_within_the_focal_distance_are_upright_and_shrink_past_it():
 
 
 def test_normals_meet_a_tilted_horizon_where_algebra_says():
+    rng = np.random.default_rng(2)
     grid = SplineGrid.over(np.full(2, -20.0), np.full(2, 20.0), 3.5)
     horizons = Horizons(grid, 3 + 0.1 * grid.nodes[:, 0], np.full(grid.size, -2.0))
-    U = RNG.uniform(-10, 10, (60, 2))
-    slip = np.column_stack([RNG.uniform(-0.8, 0.8, 60), np.zeros(60)])
+    U = rng.uniform(-10, 10, (60, 2))
+    slip = np.column_stack([rng.uniform(-0.8, 0.8, 60), np.zeros(60)])
     bottom, top = horizons.crossings(U, slip, limit=50.0)
     # t = 3 + 0.1 (x - t s)  =>  t = (3 + 0.1 x) / (1 + 0.1 s)
     assert np.allclose(top, (3 + 0.1 * U[:, 0]) / (1 + 0.1 * slip[:, 0]), atol=1e-12)

@@ -13,10 +13,9 @@ from geounfold.methods.sheet.mid_surface.normal_equations import (
 )
 from geounfold.methods.sheet.mid_surface.spline import SplineGrid
 
-RNG = np.random.default_rng(5)
 GRID = SplineGrid.over(np.array([-4.0, 2.0]), np.array([30.0, 24.0]), 3.5)
-U = np.array([-4.0, 2.0]) + RNG.random((700, 2)) * [34.0, 22.0]
-WEIGHT = RNG.random(len(U)) + 0.1
+U = np.array([-4.0, 2.0]) + np.random.default_rng(5).random((700, 2)) * [34.0, 22.0]
+WEIGHT = np.random.default_rng(6).random(len(U)) + 0.1
 
 
 def assembled() -> Stencils:
@@ -32,8 +31,9 @@ def differences(n: int, order: int) -> sp.csr_array:
 
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_energy_is_the_sum_of_squared_differences(order):
+    rng = np.random.default_rng(5)
     nu, nv = GRID.shape
-    c = RNG.random(GRID.size)
+    c = rng.random(GRID.size)
     terms = [sp.kron(differences(nu, k), differences(nv, order - k)) @ c for k in range(order + 1)]
     binomial = [1, order, order * (order - 1) // 2, order, 1]
     weights = binomial[: order + 1] if order == 4 else {2: [1, 2, 1], 3: [1, 3, 3, 1]}[order]
@@ -56,13 +56,15 @@ def test_gram_of_no_points_is_zero():
 
 
 def test_product_sum_and_multiple_agree_with_the_sparse_matrix():
+    rng = np.random.default_rng(5)
     K = assembled()
-    for x in (RNG.random(GRID.size), RNG.random((GRID.size, 3))):
+    for x in (rng.random(GRID.size), rng.random((GRID.size, 3))):
         assert np.allclose(K @ x, K.sparse() @ x, atol=1e-12)
 
 
 def test_between_normals_weighs_entries_by_their_cosine():
-    nodes = RNG.normal(size=(GRID.size, 3))
+    rng = np.random.default_rng(5)
+    nodes = rng.normal(size=(GRID.size, 3))
     nodes /= np.linalg.norm(nodes, axis=1, keepdims=True)
     E = GRID.energy(4)
     expected = E.sparse().toarray() * (nodes @ nodes.T)
@@ -71,35 +73,39 @@ def test_between_normals_weighs_entries_by_their_cosine():
 
 @pytest.mark.parametrize("largest", [normal_equations._LARGEST_BAND, 10])
 def test_solvers_solve(monkeypatch, largest):
+    rng = np.random.default_rng(5)
     monkeypatch.setattr(normal_equations, "_LARGEST_BAND", largest)  # 10: the sparse factorisation
-    K, b = assembled(), RNG.random((GRID.size, 2))
+    K, b = assembled(), rng.random((GRID.size, 2))
     A = K.sparse().toarray() + 1e-6 * np.eye(GRID.size)
     # Errors are rounding times the condition number, here below 1e7.
     assert np.allclose(A @ K.solver(ridge=1e-6)(b), b, atol=1e-8)
 
 
 def test_matrix_that_rounding_makes_indefinite_is_solved_all_the_same():
+    rng = np.random.default_rng(5)
     K = GRID.energy(2)  # blind to linear functions: singular
-    b = K @ RNG.random(GRID.size)
+    b = K @ rng.random(GRID.size)
     assert np.allclose(K @ K.solver(ridge=1e-12)(b), b, atol=1e-6)
 
 
 @pytest.mark.parametrize("largest", [normal_equations._LARGEST_BAND, 10])
 def test_coupled_fields_are_solved_together(monkeypatch, largest):
+    rng = np.random.default_rng(5)
     monkeypatch.setattr(normal_equations, "_LARGEST_BAND", largest)
     B, H = GRID.basis(U), GRID.basis(U[::-1] * 0.9)
     first = gram(B, WEIGHT, GRID.shape) + 0.1 * GRID.energy(3)
     second = gram(H, WEIGHT, GRID.shape) + 0.1 * GRID.energy(2)
-    side = np.where(RNG.random(len(U)) < 0.5, -1.0, 1.0)
+    side = np.where(rng.random(len(U)) < 0.5, -1.0, 1.0)
     cross = sp.csr_array(B.T @ H.multiply((WEIGHT * side)[:, None]).tocsr())
     whole = sp.block_array([[first.sparse(), cross], [cross.T, second.sparse()]]).toarray()
-    b = RNG.random(2 * GRID.size)
+    b = rng.random(2 * GRID.size)
     x = coupled_solver(first, second, cross, ridge=1e-6)(b)
     assert np.allclose(whole @ x + 1e-6 * x, b, atol=1e-8)
 
 
 def test_sparse_solver_solves():
+    rng = np.random.default_rng(5)
     A = sp.random_array((60, 60), density=0.1, rng=np.random.default_rng(0))
     K = sp.csc_array(A @ A.T + sp.eye_array(60))
-    b = RNG.random((60, 2))
+    b = rng.random((60, 2))
     assert np.allclose(K @ spd_solver(K)(b), b, atol=1e-12)

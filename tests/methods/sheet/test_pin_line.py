@@ -6,13 +6,13 @@ import pytest
 import geounfold as gu
 from geounfold.methods.sheet.mid_surface.pin_line import CrossSection
 
-RNG = np.random.default_rng(3)
 STRAIGHT = np.eye(2)
 
 
 def points(width):
     """Points of a sheet 60 long, so wide at x = 0..60 as ``width`` says, twice in a unit square."""
-    U = RNG.uniform([0, -20], [60, 20], (4800, 2))
+    rng = np.random.default_rng(3)
+    U = rng.uniform([0, -20], [60, 20], (4800, 2))
     return U[np.abs(U[:, 1]) <= width(U[:, 0]) / 2]
 
 

@@ -19,8 +19,6 @@ from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS, bounded_slop
 from geounfold.methods.sheet.meshing.repair import climb
 from geounfold.methods.sheet.meshing.tents import with_tents
 
-RNG = np.random.default_rng(11)
-
 
 def grid(n, layers):
     i, j = (a.ravel().astype(float) for a in np.indices((n, n)))
@@ -48,8 +46,9 @@ def test_untangling_moves_few_vertices_and_turns_all_upright():
 
 
 def test_the_foldover_energy_has_the_gradient_it_says():
+    rng = np.random.default_rng(11)
     V, T, _ = grid(3, 3)
-    spoiled = V + 0.4 * RNG.normal(size=V.shape)  # some inverted, some not
+    spoiled = V + 0.4 * rng.normal(size=V.shape)  # some inverted, some not
     volumes = tet_volumes(spoiled, T)
     assert (volumes < 0).any()
     assert (volumes > 0).any()
@@ -63,9 +62,10 @@ def test_the_foldover_energy_has_the_gradient_it_says():
 
 
 def test_slopes_are_bounded_and_never_raised():
+    rng = np.random.default_rng(11)
     V, _, F = grid(15, 2)
     U = V[: 15 * 15, :2]
-    values = RNG.uniform(1, 9, len(U))
+    values = rng.uniform(1, 9, len(U))
     out = bounded_slope(values, U, F, 0.5)
     assert (out <= values).all()
     edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
@@ -82,7 +82,8 @@ def test_slopes_are_bounded_and_never_raised():
 
 def test_cells_that_touch_in_a_corner_are_joined():
     """Two clouds of feet whose cells, without dilation, meet in one corner."""
-    first = RNG.uniform(0, 6, (400, 2))
+    rng = np.random.default_rng(11)
+    first = rng.uniform(0, 6, (400, 2))
     prints = footprint(np.concatenate([first, first - 6.0]), 0.0, 1.0, 0)
     T = prism_tets(prints.F, len(prints.U), 2)
     assert Gluing.of(T).sound

@@ -19,8 +19,6 @@ from geounfold.methods.sheet.sharpening.lattice_sites import scatter, surface_si
 from geounfold.methods.sheet.sharpening.site_options import SiteOptions
 from geounfold.synthetic import simulate
 
-RNG = np.random.default_rng(11)
-
 
 def test_sites_of_a_cube_of_27_blocks():
     cells = np.add(list(product(range(3), repeat=3)), [5, -7, 0])
@@ -35,8 +33,9 @@ def test_sites_of_a_cube_of_27_blocks():
 
 
 def test_sites_do_not_know_the_rows_order():
-    cells = np.unique(RNG.integers(0, 6, (150, 3)), axis=0)
-    mixed = cells[RNG.permutation(len(cells))]
+    rng = np.random.default_rng(11)
+    cells = np.unique(rng.integers(0, 6, (150, 3)), axis=0)
+    mixed = cells[rng.permutation(len(cells))]
     first, second = (surface_sites(c, np.ones(3)) for c in (cells, mixed))
     assert np.array_equal(first.points, second.points)
 
@@ -50,10 +49,11 @@ def flat_sheet():
 
 
 def test_moving_all_coefficients_moves_the_surface_as_much():
+    rng = np.random.default_rng(11)
     sheet = flat_sheet()
     nodes = node_normals(sheet)
     assert np.allclose(nodes, [0, 0, 1])
-    U = RNG.uniform(-10, 10, (50, 2))
+    U = rng.uniform(-10, 10, (50, 2))
     A = displacement_basis(sheet, nodes, U, np.tile([0.0, 0.0, 1.0], (50, 1)))
     assert np.allclose(A.sum(axis=1), 1)
     energy = sheet.grid.energy(3)
@@ -61,20 +61,23 @@ def test_moving_all_coefficients_moves_the_surface_as_much():
 
 
 def test_layers_are_counted():
-    level = (2 * RNG.integers(0, 5, 400) + 1 - 5) / 5
-    half = RNG.uniform(2.3, 2.7, 400)
-    found = layer_heights(half * level + RNG.normal(0, 0.05, 400), half, 0.5)
+    rng = np.random.default_rng(11)
+    level = (2 * rng.integers(0, 5, 400) + 1 - 5) / 5
+    half = rng.uniform(2.3, 2.7, 400)
+    found = layer_heights(half * level + rng.normal(0, 0.05, 400), half, 0.5)
     assert found == pytest.approx(level)
 
 
 def test_points_in_no_layers_are_seen_as_such():
+    rng = np.random.default_rng(11)
     half = np.full(2000, 4.0)
-    assert layer_heights(RNG.uniform(-4, 4, 2000), half, 0.5) is None
+    assert layer_heights(rng.uniform(-4, 4, 2000), half, 0.5) is None
 
 
 def test_scatter_is_even():
+    rng = np.random.default_rng(11)
     # A quarter of many points each, within four standard deviations of sqrt(4000 * 3) / 4.
-    share = np.histogram(scatter(RNG.uniform(-40, 40, (4000, 3))), 4, (0, 1))[0]
+    share = np.histogram(scatter(rng.uniform(-40, 40, (4000, 3))), 4, (0, 1))[0]
     assert np.abs(share - 1000).max() < 110
 
 
@@ -97,13 +100,14 @@ def test_sites_bring_the_sheet_nearer_to_the_truth(lattice_fit):
 
 
 def test_sites_that_no_sheet_separates_are_refused(lattice_fit):
+    rng = np.random.default_rng(11)
     _, _, after = lattice_fit
     fitted = after.fits[0].sheet.fitted
     points = after.frame.snap(after.frame.to_work(after.folded))
     steps = after.frame.steps
     sites = surface_sites(np.rint(points / steps).astype(np.int64), steps)
     assert sharpen(fitted, sites, SiteOptions()).sheet is not None
-    mixed = type(sites)(sites.points, RNG.permutation(sites.occupied))
+    mixed = type(sites)(sites.points, rng.permutation(sites.occupied))
     assert sharpen(fitted, mixed, SiteOptions()).sheet is None
 
 

@@ -5,9 +5,8 @@ import pytest
 
 from geounfold.methods.sheet.mid_surface.spline import SplineGrid, density_weights
 
-RNG = np.random.default_rng(3)
 GRID = SplineGrid.over(np.array([-4.0, 2.0]), np.array([17.0, 11.0]), 3.5)
-INSIDE = np.array([-4.0, 2.0]) + RNG.random((200, 2)) * [21.0, 9.0]
+INSIDE = np.array([-4.0, 2.0]) + np.random.default_rng(3).random((200, 2)) * [21.0, 9.0]
 
 
 def test_basis_sums_to_one_and_its_derivatives_to_nothing():
@@ -24,7 +23,8 @@ def test_linear_functions_are_reproduced_from_the_greville_points():
 
 
 def test_jet_agrees_with_the_basis_and_with_finite_differences():
-    C = RNG.random((GRID.size, 3))
+    rng = np.random.default_rng(3)
+    C = rng.random((GRID.size, 3))
     jet = GRID.jet(C, INSIDE)
     orders = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
     for value, (du, dv) in zip(jet, orders, strict=True):
@@ -49,6 +49,7 @@ def test_energy_is_blind_to_polynomials_below_its_order(order):
 
 
 def test_density_weights_count_every_occupied_cell_once():
-    U = RNG.random((500, 2)) * 10
+    rng = np.random.default_rng(3)
+    U = rng.random((500, 2)) * 10
     cells = len(np.unique(np.floor((U - U.min(axis=0)) / 2.0), axis=0))
     assert density_weights(U, 2.0).sum() == pytest.approx(cells)

@@ -9,8 +9,6 @@ import pytest
 import geounfold as gu
 from geounfold.mapping.mesh_map import load
 
-RNG = np.random.default_rng(3)
-
 
 @pytest.fixture(scope="module", params=["plunging", "recumbent", "tight_hinge"])
 def case(request):
@@ -25,8 +23,9 @@ def size(points):
 
 def cloud(u, count=4000):
     """Points around the body, up to some six blocks away."""
-    from_ = u.folded[RNG.integers(len(u.folded), size=count)]
-    return from_ + RNG.normal(size=(count, 3)) * 2.5 * u.frame.scale
+    rng = np.random.default_rng(3)
+    from_ = u.folded[rng.integers(len(u.folded), size=count)]
+    return from_ + rng.normal(size=(count, 3)) * 2.5 * u.frame.scale
 
 
 def test_every_block_and_every_point_with_an_image_comes_back(case):
@@ -66,10 +65,11 @@ def test_flags_and_distances_agree(case):
 
 def test_the_continuation_goes_on_as_the_layers_do():
     """Beside, above and below the body the true fold goes on, and so does the map."""
+    rng = np.random.default_rng(3)
     body = gu.simulate("plunging", width=240.0)
     u = gu.unfold(body.folded)
-    truth = body.truth[RNG.integers(len(body.truth), size=3000)]
-    beyond = truth + RNG.uniform(-1, 1, truth.shape) * [0, 0, 6 * u.frame.scale]
+    truth = body.truth[rng.integers(len(body.truth), size=3000)]
+    beyond = truth + rng.uniform(-1, 1, truth.shape) * [0, 0, 6 * u.frame.scale]
     away = np.abs(beyond[:, 2]) - body.sheet.spec.shape.reach()
     beyond = beyond[(away > 0) & (away < 2 * u.frame.scale)]
     carried = u.map.carry(body.sheet.fold(beyond))

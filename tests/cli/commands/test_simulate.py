@@ -1,0 +1,33 @@
+"""The command simulate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from geounfold.cli import main
+
+
+def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--list"]) == 0
+    cases = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert {"sim_case_1", "sim_case_2"} <= {name for name, _description in cases}
+    out = tmp_path / "thin.parquet"
+    pytest.importorskip("pyarrow")
+    assert main(["simulate", "sim_case_1", "-o", str(out)]) == 0
+    assert {"centroid_x", "true_z"} <= set(pd.read_parquet(out))
+    assert main(["simulate", "no_such_case", "-o", str(tmp_path / "x.csv")]) == 2
+    assert "sim_case_1" in capsys.readouterr().err
+    assert main(["simulate", "--list", "-o", str(tmp_path / "x.csv")]) == 2
+    assert "--list stands alone" in capsys.readouterr().err
+
+
+def test_simulate_writes_four_decimals_and_about_so_many_blocks(tmp_path: Path) -> None:
+    out = tmp_path / "small.csv"
+    assert main(["simulate", "sim_case_1", "--blocks", "2000", "-o", str(out)]) == 0
+    rows = out.read_text().splitlines()[1:]
+    assert 1600 < len(rows) < 2400  # whole blocks, six layers: measured 1,944
+    assert max(len(value.partition(".")[2]) for row in rows for value in row.split(",")) == 4
+    assert main(["simulate", "sim_case_1", "--blocks", "0", "-o", str(tmp_path / "x.csv")]) == 2

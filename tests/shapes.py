@@ -1,4 +1,4 @@
-"""Shapes that several test files use: boxes of blocks, planes, slabs of prisms, cylinders, turns."""
+"""Shapes that several test files use: boxes, planes, slabs of prisms, rolls, turns."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5
 """The cube's six tetrahedra about the diagonal from corner 0 to corner 7 (Kuhn)."""
 
 
-def cells(*counts: int) -> Ints:
+def grid_cells(*counts: int) -> Ints:
     """Return the whole cells (n, 3) of a box of so many cells a side, from (0, 0, 0) on."""
     return np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def box(*counts: int) -> Floats:
     """Return the centroids (n, 3) of a box of unit blocks, about the origin."""
-    return cells(*counts) - (np.array(counts) - 1) / 2
+    return grid_cells(*counts) - (np.array(counts) - 1) / 2
 
 
 def plane(nx: int, ny: int) -> tuple[Floats, Ints]:

@@ -1,7 +1,5 @@
 """Blocks merged into cells: what they hold, when they are merged, and that the answer stays."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -13,18 +11,15 @@ from geounfold.methods.sheet.options import SheetOptions
 from geounfold.methods.sheet.sharpening.lattice_sites import surface_sites
 from geounfold.synthetic import simulate
 from geounfold.unfolding.options_toml import from_toml
+from tests.shapes import grid_cells
 
 UNIT = np.ones(3)
 NEVER = "[sheet_options]\nmerge_above = 1_000_000_000\n"
 SOON = "[sheet_options]\nmerge_above = 1_000\n"
 
 
-def box(*shape):
-    return np.array(list(product(*map(range, shape))), dtype=float)
-
-
 def test_cells_of_a_box():
-    found = merge_blocks(box(12, 12, 12), UNIT, 3)
+    found = merge_blocks(grid_cells(12, 12, 12) * 1.0, UNIT, 3)
     # 4^3 cells, all full; of these 2^3 have all their neighbours, with 27 blocks each.
     assert len(found.points) == 64
     assert np.all(found.share == 1)
@@ -65,8 +60,8 @@ def test_cells_off_a_lattice_hold_every_point():
 def test_blocks_are_merged_as_far_as_surface_and_thickness_allow(changes, expected, monkeypatch):
     for name, value in changes.items():
         monkeypatch.setattr(merged_blocks, name, value)
-    assert merge_sizes(box(60, 60, 12), UNIT, 1000) == expected
-    assert merge_sizes(box(60, 60, 12), UNIT, 43_200) == ()
+    assert merge_sizes(grid_cells(60, 60, 12) * 1.0, UNIT, 1000) == expected
+    assert merge_sizes(grid_cells(60, 60, 12) * 1.0, UNIT, 43_200) == ()
 
 
 def test_options_are_checked():

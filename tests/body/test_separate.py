@@ -12,13 +12,10 @@ from geounfold.body.separate import describe_bodies, select_body, separate_bodie
 from geounfold.body.working_frame import Frame, working_frame
 from geounfold.errors import InputError, OptionError
 from tests.places import SHARED
+from tests.shapes import grid_cells
 
 PLAIN = Frame(np.zeros(3), np.eye(3), 1.0, None)
 UTM = np.array([5e5, 1e7, 300.0])
-
-
-def box(*shape):
-    return np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 3) * 1.0
 
 
 def shifted(points, by):
@@ -27,7 +24,7 @@ def shifted(points, by):
 
 def sheet(thickness, amplitude, steps=(1, 1, 1)):
     """Blocks of a folded sheet of a true thickness in blocks, wave length 50."""
-    cells = box(80, 30, 2 * (amplitude + 2 * thickness) + 1)
+    cells = grid_cells(80, 30, 2 * (amplitude + 2 * thickness) + 1) * 1.0
     cells[:, 2] -= amplitude + 2 * thickness
     phase = 2 * np.pi * cells[:, 0] / 50
     slope = amplitude * 2 * np.pi / 50 * np.cos(phase)
@@ -60,30 +57,30 @@ TURN = Rotation.from_euler("zyx", [37, 12, 5], degrees=True).as_matrix()
 @pytest.mark.parametrize("count", [0, 1, MIN_POINTS - 1])
 def test_too_few_points(count):
     with pytest.raises(InputError, match=f"only {count} distinct points.*at least {MIN_POINTS}"):
-        check_points(box(10, 10, 2)[:count])
+        check_points(grid_cells(10, 10, 2)[:count])
 
 
 def test_duplicates_count_once():
-    points = np.repeat(box(4, 4, 2), 3, axis=0)
+    points = np.repeat(grid_cells(4, 4, 2), 3, axis=0)
     assert count_duplicates(points) == 64
     with pytest.raises(InputError, match=r"only 32 distinct points \(96 rows with duplicates\)"):
         check_points(points)
-    check_points(np.repeat(box(6, 6, 2), 3, axis=0))
+    check_points(np.repeat(grid_cells(6, 6, 2), 3, axis=0))
 
 
 def test_one_column_names_it():
     with pytest.raises(InputError, match=r"in one column \(x = 500001 and y = 10000002\)"):
-        check_points(box(1, 1, 60) + np.array([1, 2, 0]) + UTM)
+        check_points(grid_cells(1, 1, 60) + np.array([1, 2, 0]) + UTM)
 
 
 @pytest.mark.parametrize("decimals", [2, 12])
 def test_a_line(decimals):
     with pytest.raises(InputError, match="on one line"):
-        check_points(np.round((box(60, 1, 1) * 10) @ TURN.T + UTM, decimals))
+        check_points(np.round((grid_cells(60, 1, 1) * 10) @ TURN.T + UTM, decimals))
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN])
-@pytest.mark.parametrize("points", [box(20, 20, 1) * [20, 20, 5.0], grid(1) * [1, 1, 0]])
+@pytest.mark.parametrize("points", [grid_cells(20, 20, 1) * [20, 20, 5.0], grid(1) * [1, 1, 0]])
 def test_a_plane(points, turn):
     with pytest.raises(InputError, match="in one plane"):
         check_points(np.round(points @ turn.T + UTM, 3))
@@ -115,9 +112,9 @@ def test_a_folded_grid_of_one_layer_is_refused_and_of_two_passes(steps, noise):
 
 
 def test_narrow_strips_flat_slabs_and_sub_blocks_pass():
-    check_points(box(30, 3, 2))
-    check_points(box(20, 20, 2) * [25, 25, 2.5])
-    parents = box(12, 12, 4) * 10
+    check_points(grid_cells(30, 3, 2))
+    check_points(grid_cells(20, 20, 2) * [25, 25, 2.5])
+    parents = grid_cells(12, 12, 4) * 10
     corners = np.array(np.meshgrid(*[[-2.5, 2.5]] * 3)).reshape(3, -1).T
     split = np.random.default_rng(4).random(len(parents)) < 0.3
     mixed = np.concatenate([parents[~split], (parents[split][:, None] + corners).reshape(-1, 3)])
@@ -141,7 +138,7 @@ def test_acceptance_bodies_pass_and_are_one_body(name):
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN])
 def test_blocks_connect_over_one_missing_block_only(turn):
-    slab = box(20, 10, 3)
+    slab = grid_cells(20, 10, 3)
     for shift, parts in (
         ((21, 0, 0), 1),  # one missing block
         ((22, 0, 0), 2),  # two
@@ -154,9 +151,9 @@ def test_blocks_connect_over_one_missing_block_only(turn):
 
 def test_labels_are_ordered_by_size_whatever_the_row_order():
     a, b, c = (
-        box(20, 10, 3),
-        shifted(box(10, 10, 3), [40, 0, 0]),
-        shifted(box(10, 10, 3), [60, 0, 0]),
+        grid_cells(20, 10, 3),
+        shifted(grid_cells(10, 10, 3), [40, 0, 0]),
+        shifted(grid_cells(10, 10, 3), [60, 0, 0]),
     )
     points = np.concatenate([c, b, a, [[100.0, 0, 0]]])
     expected = np.repeat([2, 1, 0, 3], [300, 300, 600, 1])
@@ -193,7 +190,10 @@ def test_flat_cells_folded_after_gridding_hold_together(steps):
 
 def two_bodies():
     points = (
-        np.concatenate([box(10, 10, 3), shifted(box(20, 10, 3), [30, 0, 0]), [[70.0, 0, 0]]]) * 10
+        np.concatenate(
+            [grid_cells(10, 10, 3), shifted(grid_cells(20, 10, 3), [30, 0, 0]), [[70.0, 0, 0]]]
+        )
+        * 10
     )
     labels = separate_bodies(points / 10, Frame(np.zeros(3), np.eye(3), 1.0, np.ones(3)))
     return points + UTM, labels

@@ -21,33 +21,25 @@ from geounfold.flattening._unflip import _Energy, untangle
 from geounfold.flattening.measures import edge_strain
 from geounfold.geometry.measures import lengths, unique_edges
 from geounfold.geometry.mesh import TriMesh
-
-
-def strip(n=41, m=4):
-    """Parameters of a strip, (i, j), and its triangles."""
-    i, j = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
-    at = i * m + j
-    a, b, c, d = (s.ravel() for s in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
-    F = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
-    return np.c_[i.ravel(), j.ravel()].astype(float), F
+from tests.shapes import plane
 
 
 def ramp(turns=1.2):
     """A ring-shaped ramp of more than one turn: laid flat with its lengths it overlaps itself."""
-    S, F = strip(n=37, m=7)
+    S, F = plane(36, 6)
     angle, r = S[:, 0] / 36 * turns * 2 * np.pi, 4 - S[:, 1] / 3
     # Up by 0.05 a radian: 0.02 % longer along the ramp.
     return np.c_[r * np.cos(angle), r * np.sin(angle), 0.05 * angle], F
 
 
 def cap(n=9):
-    S, F = strip(n, n)
+    S, F = plane(n - 1, n - 1)
     P = (S / (n - 1) - 0.5) * 0.9
     return np.c_[P, np.sqrt(1 - (P * P).sum(axis=1))], F
 
 
 def annulus():
-    S, F = strip(9, 9)
+    S, F = plane(8, 8)
     middle = (np.abs(S[F].mean(axis=1) - 4) < 1.2).all(axis=1)
     mesh = TriMesh(np.c_[S, 0.2 * np.sin(S[:, 0])], F).submesh(~middle)[0]
     return mesh.V, mesh.F

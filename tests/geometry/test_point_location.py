@@ -9,12 +9,7 @@ from geounfold.backends.igl import TetIndex, barycentric_in_tets
 from geounfold.geometry.point_location import ON_FACE, TetWalk
 from geounfold.mapping import mesh_map
 from geounfold.mapping.mesh_space import TOUCHING
-
-CUBE = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
-# Six tetrahedra around the diagonal from (0, 0, 0) to (1, 1, 1).
-KUHN = np.array(
-    [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]
-)
+from tests.shapes import CUBE, SIX
 
 
 @pytest.fixture(scope="module", params=["recumbent", "tight_hinge", "hole"])
@@ -94,7 +89,7 @@ def test_neither_order_nor_batches_nor_threads_change_a_bit(unfolding, monkeypat
 def test_a_walk_through_a_cube_by_hand():
     # In Kuhn's cube the tetrahedra are the orders of x, y, z: the first has x > y > z.
     points = np.array([[0.9, 0.5, 0.1], [0.1, 0.5, 0.9], [0.5, 0.5, 0.5], [1.1, 0.5, 0.1]])
-    found, weights = TetWalk(CUBE, KUHN).locate(*points.T)
+    found, weights = TetWalk(CUBE, SIX).locate(*points.T)
     assert found[0] == 0
     assert found[1] == 3
     assert found[2] >= 0  # on the diagonal that all six share
@@ -105,12 +100,12 @@ def test_a_walk_through_a_cube_by_hand():
 
 def test_flat_and_inverted_tetrahedra_hold_what_they_hold():
     V = np.concatenate([CUBE, [[2.0, 0, 0], [3.0, 0, 0], [2.0, 1, 0], [2.5, 0.5, 0]]])
-    T = np.concatenate([KUHN[:, [1, 0, 2, 3]], [[8, 9, 10, 11]]])
+    T = np.concatenate([SIX[:, [1, 0, 2, 3]], [[8, 9, 10, 11]]])
     found, _ = TetWalk(V, T).locate(*np.array([[0.9, 0.5, 0.1], [2.2, 0.2, 0.0]]).T)
     assert found.tolist() == [0, -1]
 
 
 def test_the_grid_covers_places_beyond_it():
     far = np.array([[1e9, -1e9, 0.5], [-50.0, 0.5, 0.5]])
-    assert TetWalk(CUBE, KUHN).locate(*far.T)[0].tolist() == [-1, -1]
+    assert TetWalk(CUBE, SIX).locate(*far.T)[0].tolist() == [-1, -1]
     assert ON_FACE < TOUCHING  # else a point taken on a face might count as outside

@@ -7,6 +7,7 @@ import pytest
 
 from geounfold.geometry.measures import boundary_faces, tet_volumes
 from geounfold.geometry.prisms import prism_tets, whole_prisms
+from tests.shapes import plane
 
 
 @pytest.mark.parametrize("labels", list(permutations(range(3))))
@@ -38,16 +39,9 @@ def test_neighbours_share_their_diagonals():
     assert (np.einsum("ij,ij->i", normal, outward) > 0).all()
 
 
-def grid_faces(n):
-    """Triangles of an n x n grid of nodes."""
-    k = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-
-
 def test_prisms_are_found_again():
     rng = np.random.default_rng(4)
-    F = rng.permutation(25)[grid_faces(5)]  # neighbours numbered in every way
+    F = rng.permutation(25)[plane(4, 4)[1]]  # neighbours numbered in every way
     T = prism_tets(F, 25, 4)
     rows, corners = whole_prisms(T)
     # 32 triangles, 3 slabs; every tetrahedron in one prism.
@@ -60,7 +54,7 @@ def test_prisms_are_found_again():
 
 
 def test_prisms_that_lost_a_tetrahedron_are_not_found():
-    F = grid_faces(4)
+    F = plane(3, 3)[1]
     T = prism_tets(F, 16, 2)
     whole, _ = whole_prisms(T)
     for lost in (whole[5, 0], whole[5, 1], whole[5, 2]):

@@ -12,18 +12,9 @@ from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.sheet.meshing import build
 from geounfold.methods.sheet.meshing.build import ControlOptions
 from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS
+from tests.shapes import slab
 
 NONE = np.empty(0, np.int64)
-
-
-def grid(n, layers):
-    """Nodes (layers n n, 3) of a grid with unit steps, and its tetrahedra."""
-    i, j = (a.ravel().astype(float) for a in np.indices((n, n)))
-    k = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    V = np.concatenate([np.column_stack([i, j, np.full(n * n, float(z))]) for z in range(layers)])
-    return V, prism_tets(F, n * n, layers)
 
 
 def control(folded, unfolded, T):
@@ -51,7 +42,7 @@ def holding(V, T, points):
 
 
 def test_a_bent_slab_is_proved():
-    flat, T = grid(6, 3)
+    flat, T = slab(5, 5, 2)
     bent = flat + np.column_stack([0 * flat[:, 0], 0 * flat[:, 0], np.sin(flat[:, 0])])
     proof = certify(control(bent, flat, T), None, NONE)
     assert proof.injective
@@ -83,7 +74,7 @@ def test_what_winds_round_once_is_proved():
 
 
 def test_an_inverted_tetrahedron_is_named_with_its_place_and_blocks():
-    flat, T = grid(4, 2)
+    flat, T = slab(3, 3, 1)
     folded = flat.copy()
     folded[5] += [0, 0, 1.5]  # an inner node of the lower layer, pushed through the upper one
     held = np.array([0, 0, -1])
@@ -102,7 +93,7 @@ def test_an_inverted_tetrahedron_is_named_with_its_place_and_blocks():
 def test_limbs_that_overlap_far_apart_are_found():
     # A long slab rolled up so far that its end lies in its beginning: 5 units of thickness 1
     # around a radius of 1 to 2, 400 degrees.
-    flat, T = grid(20, 2)
+    flat, T = slab(19, 19, 1)
     angle = flat[:, 0] / 19 * np.radians(400)
     r = 1 + flat[:, 2]
     rolled = np.column_stack([r * np.sin(angle), flat[:, 1], r * np.cos(angle)])
@@ -115,7 +106,7 @@ def test_limbs_that_overlap_far_apart_are_found():
 
 
 def test_a_cavity_is_sound_and_a_body_within_a_body_is_not():
-    V, T = grid(6, 6)
+    V, T = slab(5, 5, 5)
     middle = V[T].mean(axis=1)
     inner = (np.abs(middle - 2.5) < 0.5).all(axis=1)
     hollow = certify(control(V, V, T[~inner]), None, NONE)
@@ -127,7 +118,7 @@ def test_a_cavity_is_sound_and_a_body_within_a_body_is_not():
 
 
 def test_tetrahedra_glued_wrongly_are_found():
-    V, T = grid(3, 2)
+    V, T = slab(2, 2, 1)
     doubled = np.concatenate([T, T[:1]])
     assert len(Gluing.of(doubled).misglued)
     assert not certify(control(V, V, doubled), None, NONE).glued

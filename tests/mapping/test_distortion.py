@@ -10,12 +10,10 @@ from geounfold.errors import ControlMeshError
 from geounfold.geometry.mesh import TetMesh
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients, distortion, edge_change, tet_edges
+from tests.shapes import CUBE, SIX
 
 # Sums of ten products of numbers near 1: a few units in the last place.
 ROUNDING = 1e-12
-
-CUBE = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
 
 
 def affine(J, folded=CUBE):

@@ -18,12 +18,6 @@ def unfold(X, method, **how):
     return gu.unfold(X, method=method, **how)
 
 
-def grid(*counts):
-    """Centroids of blocks of side 1, (n, 3), about the origin."""
-    axes = [np.arange(n) - (n - 1) / 2 for n in counts]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
 def inner(W, margin=2.0):
     """Whether blocks lie off the outline of their body, where no hull ends."""
     low, high = W[:, :2].min(axis=0) + margin, W[:, :2].max(axis=0) - margin

@@ -24,7 +24,8 @@ from geounfold.methods import (
 )
 from geounfold.methods.contract import carried_pair
 from geounfold.unfolding import options
-from tests.methods.bodies import grid, tent, unfold
+from tests.methods.bodies import tent, unfold
+from tests.shapes import box
 
 POINTWISE = [name for name, method in METHODS.items() if not method.control]
 
@@ -49,7 +50,7 @@ def test_the_table_is_what_options_offer():
 @pytest.mark.parametrize("method", EVERY)
 def test_a_flat_slab_stays_as_it_is(method):
     # Turned within its plane by 0.5 radians, so that nothing lies along an axis.
-    W = grid(30, 20, 5)
+    W = box(30, 20, 5)
     turn = Rotation.from_euler("z", 0.5).as_matrix()
     u = unfold(W @ turn.T * 10 + [300.0, 400, 50], method)
     # Blocks.  Measured 0.002 to 0.003 (sheet, ufo, volumetric), 0.007 (shear), 0.013
@@ -170,7 +171,7 @@ def test_up_turns_the_answer_over_without_mirroring(method, plunging, unfolded):
 
 @pytest.mark.parametrize("method", POINTWISE)
 def test_rules_unfold_one_body_at_a_time(method):
-    W = grid(16, 10, 3)
+    W = box(16, 10, 3)
     two = np.concatenate([W, W + np.array([40.0, 0, 0])])
     with pytest.raises(OptionError, match=r"one body at a time.*choose one by --body"):
         unfold(two, method, body="all")

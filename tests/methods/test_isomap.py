@@ -12,12 +12,12 @@ from geounfold.methods import (
     IsomapMethodOptions,
     isomap,
 )
-from tests.methods.bodies import grid
+from tests.shapes import box
 
 
 def test_landmark_isomap_of_a_plane():
     rng = np.random.default_rng(4)
-    xy = grid(30, 20, 1)[:, :2] + rng.uniform(-0.3, 0.3, (600, 2))
+    xy = box(30, 20, 1)[:, :2] + rng.uniform(-0.3, 0.3, (600, 2))
     P = np.column_stack([xy, 0.3 * xy[:, 0]])  # a slope: lengths along x grow by 4.4 %
     true = np.column_stack([xy[:, 0] * np.hypot(1, 0.3), xy[:, 1]])
     spread = np.linalg.norm(true - true.mean(axis=0), axis=1).mean()
@@ -44,7 +44,7 @@ def test_isomap_places_by_distances_exactly():
 
 
 def test_isomap_takes_equally_near_points_together():
-    P = grid(8, 8, 1)
+    P = box(8, 8, 1)
     graph = isomap._graph(P, 5)
     # Four at 1, then four at 1.41: the fifth is one of these, so all of them are taken.
     inside = np.flatnonzero(np.abs(P[:, :2]).max(axis=1) < 2.6)
@@ -53,15 +53,15 @@ def test_isomap_takes_equally_near_points_together():
 
 
 def test_isomap_refuses_a_graph_in_pieces_and_a_line():
-    apart = np.concatenate([grid(6, 6, 1), grid(6, 6, 1) + np.array([50.0, 0, 0])])
+    apart = np.concatenate([box(6, 6, 1), box(6, 6, 1) + np.array([50.0, 0, 0])])
     with pytest.raises(FlatteningError, match="falls into 2 parts; raise neighbours"):
         isomap.landmark_isomap(apart, IsomapMethodOptions())
     with pytest.raises(FlatteningError, match="the distances span no plane"):
-        isomap.landmark_isomap(grid(2, 1, 1), IsomapMethodOptions())
+        isomap.landmark_isomap(box(2, 1, 1), IsomapMethodOptions())
 
 
 def test_blocks_off_by_more_than_allowed_are_placed_again():
-    P = grid(6, 6, 3)
+    P = box(6, 6, 3)
     flat = P.copy()
     flat[50] += [0, 0, 9.0]
     sound = isomap._sound(P, flat, IsomapMethodOptions(near=8))

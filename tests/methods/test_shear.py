@@ -6,11 +6,12 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 import geounfold as gu
-from tests.methods.bodies import grid, inner, unfold
+from tests.methods.bodies import inner, unfold
+from tests.shapes import box
 
 
 def test_shear_is_exact_on_vertical_shear():
-    W = grid(44, 24, 5)
+    W = box(44, 24, 5)
     rise = 3 * np.sin(W[:, 0] / 7) + 0.2 * W[:, 1]
     u = unfold(W + np.outer(rise, [0, 0, 1]), "shear")
     # Measured 0.02 blocks, the fitted surfaces' error; slopes reach 25 degrees, and the sheet

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.methods.bodies import grid, unfold
+from tests.methods.bodies import unfold
+from tests.shapes import box
 
 
 def test_stratigraphic_is_exact_on_proportional_layers():
-    W = grid(44, 24, 5)
+    W = box(44, 24, 5)
 
     def at(xy, share):
         thick, floor = 5 + 1.5 * np.sin(xy[:, 0] / 7), 2 * np.cos(xy[:, 1] / 8)
@@ -19,7 +20,7 @@ def test_stratigraphic_is_exact_on_proportional_layers():
     share = (W[:, 2] + 2.5) / 5
     # Reference surfaces given, two blocks wider than the body: how far a hull runs off blocks that
     # lie more closely here than there is no matter of the method.
-    plan = grid(48, 28, 1)[:, :2]
+    plan = box(48, 28, 1)[:, :2]
     k = np.arange(48 * 28).reshape(48, 28)
     a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
     F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])

@@ -17,6 +17,7 @@ from geounfold.methods import thesis
 from geounfold.methods.thesis import ThesisOptions, build, joint, surfaces, thesis_control
 from geounfold.surfaces.hull import extract_hull
 from tests.places import ACCEPTANCE
+from tests.shapes import rotation
 
 CASES = ACCEPTANCE
 UP = np.array([0.0, 0.0, 1.0])
@@ -107,12 +108,6 @@ def vertical_body(height, nx=40, ny=24, thick=5.0):
     levels = np.arange(0.5, thick) - thick / 2
     blocks = np.concatenate([np.column_stack([q, height(q[:, 0]) + t]) for t in levels])
     return closed(top, bottom), blocks
-
-
-def rotation(seed):
-    q, r = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
-    q = q * np.sign(np.diag(r))
-    return q if np.linalg.det(q) > 0 else q[:, [1, 0, 2]]
 
 
 def carried(control, P):
@@ -293,11 +288,12 @@ def test_rigid_motion_changes_nothing():
     moved = hull.with_vertices(hull.V @ turn.T + shift)
     Q = P @ turn.T + shift
     Z, again = carried(thesis_control(Q, moved, turn @ UP).control, Q)
-    # Measured 2e-14 and 1e-12.  Were a principal axis to come out reversed, the border's grid
-    # would start at another corner and rim blocks would move by some thousandths; a wrong turn
-    # moves blocks by blocks.
-    assert_allclose(level, again, atol=5e-3)
-    assert_allclose(gram(Y), gram(Z), atol=0.5)
+    # LAPACK may return a principal axis reversed.  The border's grid then starts at another corner
+    # and rim blocks move by some thousandths.  Measured over 20 rotations and 11 jitters: 4e-14
+    # and 5e-11 where no axis is reversed; else 5.1e-3 to 7.4e-3, and 0.18 to 0.33 square blocks.
+    # The bounds are twice these.  A wrong turn moves blocks by blocks.
+    assert_allclose(level, again, atol=0.015)
+    assert_allclose(gram(Y), gram(Z), atol=0.7)
 
 
 def test_answers_are_the_same_bit_for_bit():

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import geounfold as gu
-from tests.methods.bodies import grid, inner
+from tests.methods.bodies import inner
+from tests.shapes import box
 
 
 def test_ufo_is_exact_on_the_reference_surface_of_a_cylinder():
-    W = grid(44, 20, 5)
+    W = box(44, 20, 5)
     R = 24.0
     angle = W[:, 0] / R  # 105 degrees between the limbs
     out = (R + W[:, 2])[:, None] * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])

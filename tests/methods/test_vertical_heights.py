@@ -14,7 +14,8 @@ from geounfold.methods import (
 )
 from geounfold.methods.vertical_heights import HeightField
 from geounfold.synthetic import simulate
-from tests.methods.bodies import grid, tent, unfold
+from tests.methods.bodies import tent, unfold
+from tests.shapes import box
 
 
 @pytest.mark.parametrize("method", ["shear", "stratigraphic"])
@@ -33,7 +34,7 @@ def test_overhangs_are_counted(method):
 
 @pytest.mark.parametrize("method", ["shear", "stratigraphic"])
 def test_a_standing_sheet_is_refused(method):
-    X = grid(30, 20, 4)[:, [0, 2, 1]]  # thin along y
+    X = box(30, 20, 4)[:, [0, 2, 1]]  # thin along y
     with pytest.raises(SplitError, match=r"stands on end.*turn --up across it"):
         unfold(X, method)
     # Along the axis across the body it is a slab.
@@ -52,7 +53,7 @@ def test_a_top_beside_its_bottom_is_refused(monkeypatch):
 
     monkeypatch.setattr(vertical_heights.VerticalRule, "column", parted)
     with pytest.raises(SplitError, match="vertically over the bottom nowhere"):
-        unfold(grid(20, 14, 4), "shear")
+        unfold(box(20, 14, 4), "shear")
 
 
 def test_crossed_columns_are_left_empty_and_counted(monkeypatch):
@@ -65,7 +66,7 @@ def test_crossed_columns_are_left_empty_and_counted(monkeypatch):
         return at._replace(top=np.where(xy[:, 0] > 8.2, at.bottom - 1, at.top))
 
     monkeypatch.setattr(vertical_heights.VerticalRule, "column", crossed)
-    u = unfold(grid(20, 14, 4), "shear")
+    u = unfold(box(20, 14, 4), "shear")
     empty = u.location == "outside"
     # Whole rows of 14 by 4 blocks at the end of the longest axis: one or two, by where the frame
     # has its origin.

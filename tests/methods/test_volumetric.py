@@ -13,7 +13,8 @@ from geounfold.methods import (
     VolumetricOptions,
     volumetric,
 )
-from tests.methods.bodies import QUICK, grid
+from tests.methods.bodies import QUICK
+from tests.shapes import box
 
 
 def test_volumetric_strains_less_than_what_it_starts_from(unfolded):
@@ -35,7 +36,7 @@ def test_volumetric_says_when_it_stops_early(unfolded):
 
 
 def test_volumetric_stops_where_nothing_moves():
-    u = gu.unfold(grid(16, 10, 3), method="volumetric")
+    u = gu.unfold(box(16, 10, 3), method="volumetric")
     assert u.fits[0].notes["converged"]
     assert u.fits[0].notes["moved_last"] <= VolumetricOptions().tol
     assert u.summary()["warnings"] == []

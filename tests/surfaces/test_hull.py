@@ -18,15 +18,10 @@ from geounfold.surfaces.hull.alpha import alpha_solid
 from geounfold.surfaces.hull.density import density_field
 from geounfold.surfaces.hull.outermost_points import outer_shell
 from tests.places import SHARED
+from tests.shapes import box
 
 UNIT = np.ones(3)
 TETRAHEDRON = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
-
-
-def box(*counts: int) -> Floats:
-    """Centroids of a box of unit blocks, around the origin."""
-    axes = [np.arange(n) - (n - 1) / 2 for n in counts]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def ball(radius: float) -> Floats:

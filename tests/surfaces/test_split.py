@@ -13,15 +13,10 @@ from geounfold.surfaces.hull import extract_hull
 from geounfold.surfaces.split import NORMAL_THRESHOLD, SPLITS, signed_graph, split, split_signed
 from geounfold.surfaces.split.is_sheet import MIN_EXTENT, side_extent
 from geounfold.surfaces.split.result import SurfaceSplit
+from tests.shapes import box, rotation
 
 UNIT = np.ones(3)
-TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
-TURN[0] *= np.linalg.det(TURN)
-
-
-def box(*counts: int) -> Floats:
-    axes = [np.arange(n) - (n - 1) / 2 for n in counts]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+TURN = rotation(3)
 
 
 def ellipsoid(a: float, b: float, c: float) -> Floats:

@@ -18,19 +18,11 @@ from geounfold.methods.sheet.meshing.footprint import footprint
 from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS, bounded_slope
 from geounfold.methods.sheet.meshing.repair import climb
 from geounfold.methods.sheet.meshing.tents import with_tents
-
-
-def grid(n, layers):
-    i, j = (a.ravel().astype(float) for a in np.indices((n, n)))
-    k = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
-    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    V = np.concatenate([np.column_stack([i, j, np.full(n * n, float(z))]) for z in range(layers)])
-    return V, prism_tets(F, n * n, layers), F
+from tests.shapes import plane, slab
 
 
 def test_untangling_moves_few_vertices_and_turns_all_upright():
-    V, T, _ = grid(12, 4)
+    V, T = slab(11, 11, 3)
     spoiled = V.copy()
     bad = np.array([144 + 12 * 5 + 5, 144 + 12 * 5 + 6])
     spoiled[bad] += [0.0, 0.3, 1.7]  # pushed through the layer above, which is 1 away
@@ -47,7 +39,7 @@ def test_untangling_moves_few_vertices_and_turns_all_upright():
 
 def test_the_foldover_energy_has_the_gradient_it_says():
     rng = np.random.default_rng(11)
-    V, T, _ = grid(3, 3)
+    V, T = slab(2, 2, 2)
     spoiled = V + 0.4 * rng.normal(size=V.shape)  # some inverted, some not
     volumes = tet_volumes(spoiled, T)
     assert (volumes < 0).any()
@@ -63,8 +55,7 @@ def test_the_foldover_energy_has_the_gradient_it_says():
 
 def test_slopes_are_bounded_and_never_raised():
     rng = np.random.default_rng(11)
-    V, _, F = grid(15, 2)
-    U = V[: 15 * 15, :2]
+    U, F = plane(14, 14)
     values = rng.uniform(1, 9, len(U))
     out = bounded_slope(values, U, F, 0.5)
     assert (out <= values).all()

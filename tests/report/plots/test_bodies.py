@@ -23,6 +23,7 @@ from geounfold.report.plots.bodies import (
 from geounfold.report.plots.figures import draw_curves, draw_distribution, png
 from geounfold.report.plots.rendering import block_sides, check_rendering, render_body
 from geounfold.report.plots.style import ViewOptions
+from tests.shapes import CUBE, SIX, grid_cells
 
 try:
     check_rendering()
@@ -32,11 +33,8 @@ except MissingDependencyError as error:
 needs_rendering = pytest.mark.skipif(bool(CANNOT), reason=CANNOT or "nothing is missing")
 
 SMALL = ViewOptions(size=(160, 120))
-GRID = np.stack(np.meshgrid(*[np.arange(float(n)) for n in (8, 6, 4)], indexing="ij"), -1)
-SLAB = GRID.reshape(-1, 3) * [10, 10, 5] + [5e5, 7e6, 300]  # as far out as real surveys lie
+SLAB = grid_cells(8, 6, 4) * [10, 10, 5] + [5e5, 7e6, 300]  # as far out as real surveys lie
 
-CUBE = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
 CONTROL = ControlMesh(TetMesh(CUBE, SIX), TetMesh(2 * CUBE, SIX), CUBE[:, 2])
 
 
@@ -49,7 +47,7 @@ def is_png(data):
 
 def test_sides_of_blocks_on_a_lattice_and_off_it():
     np.testing.assert_allclose(block_sides(SLAB), [10, 10, 5])
-    turned = GRID.reshape(-1, 3) @ np.array([[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1.0]])
+    turned = grid_cells(8, 6, 4) @ np.array([[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1.0]])
     turned += 0.05 * np.random.default_rng(0).random(turned.shape)
     # Unit spacing; six neighbours of a border block lie up to sqrt 2 away: measured 1.20.
     assert ((block_sides(turned) > 0.95) & (block_sides(turned) < 1.4)).all()
@@ -57,7 +55,7 @@ def test_sides_of_blocks_on_a_lattice_and_off_it():
 
 
 def test_blocks_behind_others_are_left_out_and_no_others():
-    cube = np.stack(np.meshgrid(*[np.arange(9.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    cube = grid_cells(9, 9, 9) * 1.0
     seen = rendering._seen(cube, np.ones(3), np.array([1.0, 1.0, 1.0]))
     assert not seen[(cube < 7).all(axis=1)].any()
     assert seen[(cube >= 7).any(axis=1)].all()

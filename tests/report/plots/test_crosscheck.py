@@ -9,9 +9,8 @@ from geounfold.errors import InputError
 from geounfold.geometry.mesh import TetMesh
 from geounfold.report.plots.crosscheck import cut_polygons, draw_cuts, draw_histograms
 from geounfold.report.plots.figures import png
+from tests.shapes import CUBE, SIX
 
-CUBE = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-SIX = np.array([[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]])
 MESH = TetMesh(CUBE * [2.0, 3.0, 5.0], SIX)
 
 

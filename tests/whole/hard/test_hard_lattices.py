@@ -9,16 +9,7 @@ from geounfold.body.noisy_lattice import disturbed_lattice
 from geounfold.body.scattered import UNEVEN, local_spacing, unevenness
 from geounfold.body.sub_blocks import parting, solid_cells, surrounded
 from geounfold.methods.sheet.sharpening.lattice_sites import surface_sites
-
-
-def turned(points, seed=0):
-    """Return points after a rigid motion at random, to UTM coordinates."""
-    q = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
-    return points @ (q * np.sign(np.linalg.det(q))).T + [412_300.0, 6_815_750.0, 1_480.0]
-
-
-def grid(*counts):
-    return np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
+from tests.shapes import grid_cells, turned
 
 
 def errors(body, points):
@@ -62,7 +53,7 @@ def test_equal_blocks_are_their_own_cells():
 
 def test_blocks_that_no_halving_explains_stay_as_they_are():
     """Parents of side 3 beside blocks of side 1: thirds, which are not tried."""
-    k = grid(12, 6, 6) + 0.5
+    k = grid_cells(12, 6, 6) + 0.5
     small = k[:, 0] < 6
     thirds = np.unique(k[~small] // 3, axis=0) * 3 + 1.5
     points = np.concatenate([k[small], thirds])
@@ -86,7 +77,7 @@ def test_sub_blocked_bodies_unfold(split):
 
 def test_missing_blocks_are_found_where_blocks_surround_them():
     rng = np.random.default_rng(3)
-    cells = grid(20, 18, 9)
+    cells = grid_cells(20, 18, 9)
     lost = rng.random(len(cells)) < 0.05
     inner = ((cells > 0) & (cells < [19, 17, 8])).all(axis=1)
     found = {tuple(c) for c in surrounded(cells[~lost])}
@@ -105,7 +96,7 @@ def test_whole_bodies_have_no_missing_blocks():
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_slab_that_parts_the_body_is_found(axis):
-    cells = grid(15, 14, 13)
+    cells = grid_cells(15, 14, 13)
     slab = cells[:, axis] == 6
     found = parting(cells[~slab])
     assert {tuple(c) for c in found} == {tuple(c) for c in cells[slab]}
@@ -113,7 +104,7 @@ def test_a_slab_that_parts_the_body_is_found(axis):
 
 def test_limbs_that_nearly_touch_are_no_missing_slab():
     """A gap one block wide between two limbs that a hinge joins."""
-    cells = grid(20, 12, 9)
+    cells = grid_cells(20, 12, 9)
     gap = (cells[:, 2] == 4) & (cells[:, 0] < 17)
     assert not len(parting(cells[~gap]))
     assert not len(surrounded(cells[~gap]))
@@ -121,7 +112,7 @@ def test_limbs_that_nearly_touch_are_no_missing_slab():
 
 def test_pits_of_incomplete_models_say_nothing():
     rng = np.random.default_rng(0)
-    cells = grid(40, 40, 8)
+    cells = grid_cells(40, 40, 8)
     whole = surface_sites(cells, np.ones(3))
     holed = cells[(rng.random(len(cells)) >= 0.05) | (cells[:, 2] < 7)]  # 5 % of the top layer
     sites = surface_sites(holed, np.ones(3))

@@ -74,23 +74,23 @@ def markdown(frame: pd.DataFrame, form: str = ".3f") -> str:
 
 INTRODUCTION = """# Does it pay?
 
-Grades are simulated in the true flat space of simulated bodies, drilled in the folded one
-(vertical, inclined and fanned holes), and kriged at blocks drawn from it. The arms differ by
-nothing but the coordinates: each has the same samples, the same automatic fit of a variogram, and
-the 24 nearest samples, no more than 6 of a hole.
+The study simulates grades in the true flat space of simulated bodies. It drills them in the
+folded space (vertical, inclined and fanned holes), and kriges at blocks drawn from the body. The
+arms differ by the coordinates only: each has the same samples, the same automatic fit of a
+variogram, and the 24 nearest samples, no more than 6 of a hole.
 
 | arm | coordinates |
 |---|---|
 | folded_isotropic | folded, one range |
 | folded_best | folded, the best of nine settings (isotropic, and planes through the true \
-fold axis of five dips, with two or three ranges), judged by the truth: no user could do as well |
+fold axis of five dips, with two or three ranges), chosen by the truth, which no user knows |
 | stratigraphic | x, y, and the true height between bottom and top times the mean thickness |
 | geounfold | unfolded from the blocks, defaults |
-| truth | the true flat ones: the ceiling |
+| truth | the true flat coordinates: the ceiling |
 
-Rough fields are spherical or exponential (some lognormal, some layered), smooth ones gaussian; the
-ranges are 200 m along the layer and 25 m across. An arm of locally varying anisotropy is left out:
-no kept library follows it in its search for samples.
+Rough fields are spherical or exponential (some lognormal, some layered); smooth fields are
+gaussian. The ranges are 200 m along the layer and 25 m across. There is no arm of locally varying
+anisotropy, because no maintained library uses it in the search for samples.
 """.replace("\\\n", "")
 
 
@@ -99,14 +99,15 @@ def report(table: pd.DataFrame, figure: str | None = None) -> str:
     runs = table[["body", "spacing", "seed"]].drop_duplicates()
     text = [
         INTRODUCTION,
-        f"Made by `make study`: {len(runs)} runs of {table.body.nunique()} bodies, spacings of "
-        f"{', '.join(map(str, sorted(table.spacing.unique())))} m and {table.seed.nunique()} "
-        "seeds. Grades have a mean of 1 and a deviation of 0.4, lengths are in metres.\n",
+        "`make study` makes this page: "
+        f"{len(runs)} runs of {table.body.nunique()} bodies, spacings "
+        f"of {', '.join(map(str, sorted(table.spacing.unique())))} m and {table.seed.nunique()} "
+        "seeds. Grades have a mean of 1 and a standard deviation of 0.4. Lengths are in metres.\n",
         *([] if figure is None else [f"![RMSE by arm and spacing]({figure})\n"]),
         "## Gain over the best folded setting, and share of the possible gain\n",
-        "Gain is 1 - RMSE / RMSE of folded_best; share is what an arm reaches of the difference "
-        "between folded_best and truth. Between low and high lie 95 % of the means over seeds "
-        "drawn with replacement.\n",
+        "Gain is 1 - RMSE / RMSE of folded_best. Share is the part of the difference between "
+        "folded_best and truth that an arm reaches. 95 % of the means over seeds drawn with "
+        "replacement lie between low and high.\n",
     ]
     groups = {"all": table} | {f"{f} fields": t for f, t in table.groupby("field")}
     for name, part in groups.items():

@@ -1,5 +1,5 @@
-# `make help` lists the targets. Each makes the environment in .venv first, when it is missing
-# or older than pyproject.toml or constraints.txt. Needs Python >= 3.11 with pip, and the
+# `make help` lists the targets. Each target first makes the environment in .venv, if it is missing or
+# older than pyproject.toml or constraints.txt. The targets need Python >= 3.11 with pip, and the
 # system libraries that README.md names.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -24,7 +24,7 @@ help:  ## list the targets
 
 env: $(STAMP)  ## make or renew the environment in .venv
 
-# Some systems ship Python without ensurepip: pip then installs itself from outside.
+# Some systems ship Python without ensurepip: the system's pip then installs pip into .venv.
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "geounfold needs Python 3.11 or later: make PYTHON=python3.12 ..." >&2; exit 2; }
@@ -46,10 +46,10 @@ demo: $(STAMP)  ## simulate a folded body, unfold it, write a report and say whe
 test: $(STAMP)  ## run the tests and the docstrings' examples
 	$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGS)
 
-test-all: $(STAMP)  ## the same with the slow tests
+test-all: $(STAMP)  ## run the tests, slow ones included
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
-check: $(STAMP)  ## formatting, lint, types, direction of imports, notebooks like their scripts
+check: $(STAMP)  ## formatting, lint, types, import contract, notebooks equal to their scripts
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -68,15 +68,15 @@ bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 	$(BIN)/python tests/benchmarks/scale.py --page --profile $(SCALE_ARGS)
 
-soak: $(STAMP)  ## unfold 1,000 random bodies in 30 minutes at most; goes on where it was stopped
+soak: $(STAMP)  ## unfold 1,000 random bodies, 30 minutes at most; continues a stopped run
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
 
-study: $(STAMP)  ## krige in folded, unfolded and true space, in 30 minutes; goes on where stopped
+study: $(STAMP)  ## krige in folded, unfolded and true space, 30 minutes; continues a stopped run
 	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)
 	$(BIN)/python tests/study/tables.py data/study.csv -o docs/study.md \
 	    --figure docs/assets/study.png --link assets/study.png
 
-notebooks: $(STAMP)  ## make the notebooks from their scripts, then run each; RUNS: times taken
+notebooks: $(STAMP)  ## make the notebooks from their scripts and run them; RUNS: timed runs each
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py
 	GEOUNFOLD_RUNS=$(RUNS) $(BIN)/python -m pytest --nbmake -n 2 notebooks/*.ipynb $(PYTEST_ARGS)
 
@@ -85,12 +85,12 @@ $(DOCS_STAMP): $(STAMP)
 	    --constraint constraints.txt --editable '.[$(EXTRAS),docs]'
 	@touch $@
 
-docs: $(DOCS_STAMP)  ## build the documentation into site/, its examples run first
+docs: $(DOCS_STAMP)  ## run the documentation's examples, then build it into site/
 	$(BIN)/python -m pytest -q tests/whole/test_docs.py $(PYTEST_ARGS)
 	NO_MKDOCS_2_WARNING=1 COLUMNS=100 $(BIN)/mkdocs build --strict --quiet
 	@echo "Documentation: $(CURDIR)/site/index.html"
 
-accept: $(STAMP)  ## score the acceptance bodies, where they are present
+accept: $(STAMP)  ## score the acceptance bodies, if they are present
 	@if [ -f $(ACCEPTANCE)/score.py ]; then $(BIN)/python $(ACCEPTANCE)/score.py; \
 	else echo "no acceptance bodies at $(ACCEPTANCE): nothing scored"; fi
 

@@ -17,8 +17,8 @@
 #
 # `sim_case_1` is a simulated ore body: one open anticline of 60 x 60 x 6 blocks of 10 m, with limbs
 # that dip 30 degrees. It was laid out flat first (the truth W) and then folded by flexural slip
-# (X), so every answer (Y) can be checked. The other numbers that are asserted below say where they
-# come from: the body's own geometry, the thesis, or what the method's prototype reached.
+# (X), so every answer (Y) can be checked. A comment beside each asserted number gives its source:
+# the body's own geometry, the thesis, or the prototype of the method.
 
 # %%
 import tempfile
@@ -48,7 +48,7 @@ Image(png(draw_body(X, body.stratigraphic, "true stratigraphic coordinate", band
 # %% [markdown]
 # ## One call
 #
-# Everything at its default: density hull, signed split, spring flattener, sheet method.
+# Every option has its default: density hull, signed split, spring flattener, sheet method.
 
 # %%
 u = gu.unfold(X)
@@ -58,9 +58,9 @@ u
 # %% [markdown]
 # ## Frame and lattice
 #
-# Stages work in units of one block, turned to the body's principal axes. This body was gridded
+# The stages work in units of one block, turned to the body's principal axes. This body was gridded
 # *before* folding, so its folded centroids lie on no lattice, and the unit is the typical spacing
-# of neighbours instead. The frame is an invertible similarity: nothing is lost.
+# of neighbours instead. The frame is an invertible similarity, so no information is lost.
 
 # %%
 print("lattice:", u.lattice)
@@ -72,8 +72,8 @@ assert np.abs(there_and_back - X).max() < 1e-9  # rounding of coordinates of 10^
 # %% [markdown]
 # ## Hull and split
 #
-# The hull is closed and manifold. The signed graph Laplacian then tells top from bottom, without
-# knowing what is up; the rim is neither.
+# The hull is closed and manifold. The signed graph Laplacian then separates top and bottom; it uses
+# no direction as "up". The faces that belong to neither are the edge of the sheet, the rim.
 
 # %%
 hull, split = u.hull, u.fits[0].split
@@ -89,8 +89,8 @@ Image(png(draw_split(u.hull_mesh, split.side, split.rim)))
 # %% [markdown]
 # ## Medial points and mid surface
 #
-# Half-way along each ray from the top to the bottom lies a medial point. They are noisy and end
-# before the rim; a smooth spline surface is fitted to them and continued to the rim.
+# A medial point lies half-way along each ray from the top to the bottom. Medial points are noisy
+# and end before the rim. A smooth spline surface is fitted to them and continued to the rim.
 
 # %%
 medial = u.fits[0].sheet.medial
@@ -103,17 +103,17 @@ Image(png(draw_body(points, thickness, "thickness at the medial points, m", limi
 mid = u.surfaces["mid"]
 strain = measures.edge_strain(mid.folded.V, mid.folded.F, mid.unfolded.V[:, :2])
 print(f"mid surface: {len(mid.folded.F):,} faces, edge strain {strain:.6f} (root mean square)")
-assert strain < 1e-3  # a cylinder is developable: what is left is chords for arcs
+assert strain < 1e-3  # a cylinder is developable: the rest is chords instead of arcs
 assert np.abs(mid.unfolded.V[:, 2]).max() < 1e-9  # datum: the mid surface lies at 0
 Image(png(draw_surface(mid.folded, mid.unfolded, mid.folded.V[:, 2], "height when folded, m")))
 
 # %% [markdown]
 # ## Flattening by springs
 #
-# Mid surface and two surfaces parallel to it, one above and one below, are flattened each for
-# itself, and turned onto one another. How much further the upper one reaches than the lower is
-# the slip of the layers. The energy is that of Wang's spring-mass model, brought to its minimum
-# by local-global steps.
+# The flattener flattens the mid surface and two surfaces parallel to it, one above and one below,
+# each on its own. Rigid motions then register the three. The upper one reaches further than the
+# lower: the difference is the slip of the layers. Local-global steps bring the energy of Wang's
+# spring-mass model to its minimum.
 
 # %%
 flattenings = u.fits[0].flattenings
@@ -124,7 +124,7 @@ for name, flat in flattenings.items():
     )
     assert flat.stop == "converged"
     assert flat.flips == 0
-    # The thesis's springs stop at 0.0729, having begun at 0.0785 (on its own hull).
+    # The thesis's springs begin at 0.0785 and stop at 0.0729 (on the thesis's own hull).
     assert flat.edge_error[-1] < 0.001
 energies = {name: flat.energy for name, flat in flattenings.items()}
 Image(png(draw_curves(energies, "step", "spring energy", logarithmic=True)))
@@ -133,14 +133,14 @@ Image(png(draw_curves(energies, "step", "spring energy", logarithmic=True)))
 top, bottom = u.top, u.bottom
 gap = top.unfolded.V[:, 2].mean() - bottom.unfolded.V[:, 2].mean()
 print(f"true thickness 60 m, mean distance of unfolded top and bottom {gap:.1f} m")
-assert abs(gap - 60) < 1.5  # the thesis's own code comes out at 102 m for a body of 90 m
+assert abs(gap - 60) < 1.5  # the thesis's own code gives 102 m for a body of 90 m
 Image(png(draw_surface(top.folded, top.unfolded, top.unfolded.V[:, 2], "unfolded height, m")))
 
 # %% [markdown]
 # ## Control mesh
 #
-# Prisms along the mid surface's normals, cut into tetrahedra: the same ones in both spaces. It
-# reaches past the blocks, so that every one lies inside.
+# The control mesh is made of prisms along the normals of the mid surface, cut into tetrahedra: the
+# same tetrahedra in both spaces. The mesh reaches past the blocks, so every block lies inside.
 
 # %%
 control = u.control
@@ -153,42 +153,42 @@ Image(png(draw_control(control)))
 # %% [markdown]
 # ## Mapped points
 #
-# Barycentric coordinates carry every block. It comes back through the inverse to rounding.
+# Barycentric coordinates carry every block. The inverse brings it back up to rounding.
 
 # %%
 print(f"outside {u.outside_share:.2%}, round trip at most {u.round_trip_max:.1e} m")
 assert u.outside_share == 0
-assert u.round_trip_max < 1e-4  # 1e-5 of a block is asked for; rounding leaves 1e-12 m
+assert u.round_trip_max < 1e-4  # 1e-5 of a block is required; rounding leaves 1e-12 m
 layers = u.stratigraphic
 Image(png(draw_bodies(X, Y, layers, "stratigraphic coordinate", limits=(0.0, 1.0), bands=6)))
 
 # %% [markdown]
-# ## Against the truth, beside doing nothing
+# ## Distance from the truth
 #
 # The thesis's measure, epsilon, compares each block's mean distance to its 26 neighbours (NMD) in
-# two clouds. It is nearly blind to folds: leaving the body folded scores 0.0172, better than the
-# 0.0259 of the thesis's own code (its alpha shape mended), although that code does unfold.
-# So the distance from the truth after the best rigid motion stands beside it.
+# two sets of points. It is nearly blind to folds: the folded body itself scores 0.0172, better than
+# the 0.0259 of the thesis's own code (its alpha shape mended), although that code does unfold. So
+# this cell also prints the distance from the truth after the best rigid motion.
 
 # %%
 quality = compare_with_truth(X, Y, W)
 nothing = quality.epsilon_nothing.mean
 print(f"epsilon(W, Y): mean {quality.epsilon_truth.mean:.5f}, 95 % {quality.epsilon_truth.p95:.5f}")
-print(f"epsilon(W, X): mean {nothing:.4f}, doing nothing")
+print(f"epsilon(W, X): mean {nothing:.4f}, the folded body itself")
 print(f"epsilon(X, Y): mean {quality.epsilon_folded.mean:.4f}; the thesis prints 0.0257")
-print(f"RMS from the truth {quality.rms:.3f} m; doing nothing {quality.rms_nothing:.1f} m")
+print(f"RMS from the truth {quality.rms:.3f} m; of the folded body {quality.rms_nothing:.1f} m")
 print("spacing along x, y, z over the true one:", *(f"{ratio:.5f}" for ratio in quality.spacing))
 assert quality.epsilon_truth.mean < 0.0003  # the prototype reached 0.0002
 assert quality.epsilon_truth.p95 < 0.001
 assert abs(nothing - 0.0172) < 0.0002  # of the body itself, whatever the method
 assert quality.rms < 0.15  # 0.015 of a block; the prototype reached 0.009
-assert quality.rms_nothing > 30  # what epsilon does not see
+assert quality.rms_nothing > 30  # which epsilon does not show
 assert np.abs(np.array(quality.spacing) - 1).max() < 0.001
 Image(png(draw_distribution(gu.epsilon(W, Y), "epsilon(W, Y)")))
 
 # %% [markdown]
-# NMD of each cloud, with the neighbours of the folded body. Blocks at the rim have neighbours on
-# one side only, hence the larger distances there.
+# The pictures have the NMD in both spaces, with the neighbours of the folded body. Blocks at the
+# rim have neighbours on one side only, so their distances are larger.
 
 # %%
 ids = gu.neighbours(X)
@@ -222,8 +222,8 @@ Image(png(draw_bodies(X, Y, shear, "layer-parallel shear", colours="cividis")))
 # %% [markdown]
 # ## Saving and loading the map
 #
-# The file holds the control mesh, not the points. It carries any others: here mid-points
-# between blocks and their nearest neighbours, there and back.
+# The file holds the control mesh, not the points. The loaded map carries any other points: here
+# the mid-points between blocks and their nearest neighbours, to the flat space and back.
 
 # %%
 with tempfile.TemporaryDirectory() as folder:
@@ -239,7 +239,7 @@ assert np.abs(loaded.to_folded(flat) - samples).max() < 1e-4
 # %% [markdown]
 # ## Summary
 #
-# The dict that `geounfold unfold --summary` writes.
+# `geounfold unfold --summary` writes this dict.
 
 # %%
 summary = u.summary()

@@ -15,9 +15,10 @@
 # %% [markdown]
 # # Flatteners compared
 #
-# One table: every flattener on the same surfaces. On developable ones (cylinder, cone) the exact
-# answer is known; a spherical cap has none, and the question is how its strain is shared. Real
-# fault surfaces and benchmark meshes follow where they are at hand.
+# This notebook runs every flattener on the same surfaces and puts the figures in one table. The
+# exact answer is known for developable surfaces (cylinder, cone). A spherical cap has no exact
+# answer, so flatteners differ in how they share its strain. If real fault surfaces and benchmark
+# meshes are at hand, they follow.
 
 # %%
 from pathlib import Path
@@ -47,8 +48,8 @@ def grid(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
 # %% [markdown]
 # ## Surfaces
 #
-# A cylinder of 200 degrees overhangs itself, as an overturned fold does; a third of a cone; a
-# cap of 50 degrees; a gentle egg-box, as refolded layers look.
+# The surfaces are a cylinder of 200 degrees, which overhangs itself as an overturned fold does; a
+# third of a cone; a cap of 50 degrees; and a gentle egg-box, which is the shape of refolded layers.
 
 # %%
 P, F = grid(41, 21)
@@ -86,8 +87,8 @@ print({name: len(F) for name, (_, F) in surfaces.items()})
 # %% [markdown]
 # ## One call
 #
-# `repair` is on, as by default: what folds or overlaps is mended, and the note says so; an answer
-# that is not one-to-one would be an error in the table's last column.
+# `repair` is on by default: it mends triangles that fold or overlap, and the note says so. If an
+# answer were not one-to-one, the table's last column would have the error.
 
 # %%
 table = gu.compare(surfaces)
@@ -100,10 +101,11 @@ table[["surface", "flattener", *figures, "note"]].style.format(precision=5)
 # %% [markdown]
 # ## Strain
 #
-# What geostatistics pays is length: ranges are lengths. The rms strain of edges counts every edge
-# alike, and a fault surface with eight edges of millimetres among kilometres (Kettleman Hills) is
-# then judged by those eight. So strain is also taken over area: the symmetric Dirichlet energy is
-# 4 for an isometry, and 4 plus 8 times the mean square of a small principal strain.
+# Geostatistics needs correct lengths, because ranges are lengths. The rms strain of edges counts
+# every edge alike. A fault surface with eight edges of millimetres among kilometres (Kettleman
+# Hills) is then judged by those eight edges. So the strain over area is computed too: the symmetric
+# Dirichlet energy is 4 for an isometry, and 4 plus 8 times the mean square of a small principal
+# strain.
 
 # %%
 shape = {"index": "flattener", "columns": "surface", "sort": False}
@@ -118,20 +120,22 @@ strain.style.format("{:.5f}").background_gradient(cmap="cividis", axis=0)
 # %%
 isometric = ["spring", "arap", "slim"]
 for name in DEVELOPABLE:
-    # A ruled mesh of a developable surface unrolls facet by facet: nothing but the solvers' stop
-    # rules is left.
+    # A ruled mesh of a developable surface unrolls facet by facet; the solvers' stop rules leave
+    # the only strain.
     assert edges.loc[isometric, name].max() < 1e-4, name
 for name in strain.columns:
     best = strain.loc[isometric, name].min()
-    # The springs are among the best. Where hardly any strain is needed (Kettleman Hills is nearly
-    # plane), a thousandth is what they leave at its edges of millimetres.
+    # The springs are among the best. Kettleman Hills is nearly plane and needs hardly any strain;
+    # there the springs leave a thousandth, at its edges of millimetres.
     assert strain.loc["spring", name] < max(2 * best, 1e-3), name
 for name in ("cap", "egg box", "hemisphere"):
     if name in strain:
-        assert strain.loc[isometric, name].min() > 0.005, name  # curvature forbids none
-# A cap of 50 degrees: of a rim circle sin(0.87) / 0.87 = 0.88 is left, so strains go to 0.12.
+        assert strain.loc[isometric, name].min() > 0.005, (
+            name
+        )  # curvature makes some strain inevitable
+# A cap of 50 degrees keeps sin(0.87) / 0.87 = 0.88 of its rim circle, so strains reach 0.12.
 assert 0.005 < edges.loc["spring", "cap"] < 0.06
-# Angles are kept at the price of lengths.
+# These two keep angles at the price of lengths.
 for name in ("lscm", "harmonic"):
     assert edges.loc[name, "cap"] > edges.loc["spring", "cap"]
 
@@ -156,7 +160,8 @@ plt.show()
 # %% [markdown]
 # ## Where the cap is strained
 #
-# The springs' answer: edges at the rim too short when flat, in the middle too long.
+# In the springs' answer, edges at the rim are too short when flat, and edges in the middle too
+# long.
 
 # %%
 V, F = surfaces["cap"]
@@ -168,10 +173,10 @@ assert area.min() < 1 < area.max()
 Image(png(draw_surface(flat.mesh, level, area, "area, flat over folded", colours="RdYlBu_r")))
 
 # %% [markdown]
-# ## What the guards are for
+# ## Why answers are repaired
 #
-# Without repair, angle-preserving LSCM on a half-cylinder and ARAP on rough surfaces are known to
-# flip triangles or worse. `repair=False` shows each method as it is.
+# Without repair, angle-preserving LSCM on a half-cylinder and ARAP on rough surfaces may flip
+# triangles or overlap. `repair=False` returns the answer of each method as it is.
 
 # %%
 rows = []

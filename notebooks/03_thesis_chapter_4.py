@@ -15,16 +15,16 @@
 # %% [markdown]
 # # The thesis's results chapter, run again
 #
-# The thesis compares its method ("barycentric") with U-Fo, which flattens one reference surface and
-# anchors the blocks to it, on two simulated bodies and a field body. Here are its tables 4.1 to 4.4
-# and figures 4.2 to 4.13 again, by three methods of geounfold: `thesis` (the thesis's method as it
-# is written), `ufo` (one reference surface, as the thesis describes U-Fo) and `sheet` (ours). What
-# the thesis prints stands beside what comes out here.
+# The thesis compares its method ("barycentric") with U-Fo on two simulated bodies and a field body.
+# U-Fo flattens one reference surface and anchors the blocks to it. This notebook makes the thesis's
+# tables 4.1 to 4.4 and figures 4.2 to 4.13 again with three methods of geounfold: `thesis` (the
+# thesis's method as it is written), `ufo` (one reference surface, as the thesis describes U-Fo) and
+# `sheet` (geounfold's own). The figures of the thesis are printed beside the new ones.
 #
-# The thesis's field body (6,510 points) was never published. A body between two real seismic
-# horizons takes its place (Claudius survey, Carnarvon Basin) where these data are at hand.
+# The thesis's field body (6,510 points) was never published. If the data are at hand, a body
+# between two real seismic horizons takes its place (Claudius survey, Carnarvon Basin).
 #
-# `GEOUNFOLD_RUNS` sets how often times are taken; the thesis took 10.
+# `GEOUNFOLD_RUNS` is the number of timed runs; the thesis timed 10.
 
 # %%
 import os
@@ -47,7 +47,7 @@ HORIZONS = Path("../../shared/data/claudius/claudius.csv")
 # %% [markdown]
 # ## Bodies (table 4.1, figure 4.2)
 #
-# The simulated ones have the thesis's sizes and block counts; their truth W is known.
+# The simulated bodies have the thesis's sizes and numbers of blocks; their truth W is known.
 
 
 # %%
@@ -96,8 +96,8 @@ for name, (X, _) in bodies.items():
     print(f"{name}: NMD {shown.min():.3g} to {shown.max():.3g} of the largest side")
     if name != "field":
         # The thesis's colour bar runs from 0.02 to 0.038. Inside a cubic lattice of 60 blocks the
-        # mean distance to 26 neighbours is 1.416 blocks: 0.0236 of 60, 0.026 of the folded length,
-        # which is shorter; more at rims.
+        # mean distance to 26 neighbours is 1.416 blocks. This is 0.0236 of 60 blocks, and 0.026 of
+        # the folded length, which is shorter. At rims the distance is larger.
         assert 0.0236 < shown.min() < 0.026
         assert shown.max() < 0.045
     display(Image(png(draw_body(X, shown, f"NMD of {name}", colours="cividis"))))
@@ -105,7 +105,7 @@ for name, (X, _) in bodies.items():
 # %% [markdown]
 # ## Unfolding each body by each method
 #
-# `allow_uncertified`: the thesis's method and U-Fo's prove nothing.
+# The runs need `allow_uncertified`, because the thesis's method and U-Fo's do not prove their maps.
 
 # %%
 unfolded: dict[tuple[str, str], gu.Unfolding] = {}
@@ -127,8 +127,8 @@ assert all(body == "field" for body, _ in failed)  # both simulated bodies by ev
 # %% [markdown]
 # ## Times (tables 4.2 and 4.3, figure 4.3)
 #
-# The thesis's steps against ours. Its times were taken on another machine (Intel i7-8550U): orders
-# of magnitude are what can be compared.
+# The table has geounfold's times by the steps of the thesis. The thesis took its times on another
+# machine (Intel i7-8550U), so compare orders of magnitude only.
 
 # %%
 STEPS = {
@@ -162,7 +162,7 @@ PRINTED_TIMES = pd.DataFrame(
 )
 print(f"mean and standard deviation of {RUNS} runs, seconds")
 print(times.to_string(float_format="{:.2f}".format))
-print("\nas the thesis prints them")
+print("\ntimes printed in the thesis")
 print(PRINTED_TIMES.to_string())
 
 # %%
@@ -227,7 +227,8 @@ for name in bodies:
     draw_errors(name)
 
 # %% [markdown]
-# NMD in colours: truth and folded body (figures 4.4, 4.8), then the answers, all on one scale.
+# The colours show NMD, all on one scale: truth and folded body (figures 4.4, 4.8), then the
+# answers.
 
 # %%
 for name, (X, W) in bodies.items():
@@ -256,8 +257,8 @@ for name, (X, W) in bodies.items():
 # %% [markdown]
 # ## Mean errors (table 4.4)
 #
-# RMS is ours to add: the distance from the truth after the best rigid motion, which epsilon does
-# not see.
+# This table adds the RMS, the distance from the truth after the best rigid motion, which epsilon
+# does not show.
 
 # %%
 PRINTED = {
@@ -296,20 +297,21 @@ for name in ("sim_case_1", "sim_case_2"):
     for other in ("thesis", "ufo", "doing nothing"):
         assert rms["sheet"] < rms[other] / 5, (name, other)
         assert eps["sheet"] < eps[other] / 5, (name, other)
-    # The order of magnitude of the thesis's own figures for its own method, which depend on where
-    # its alpha shape happened to close: within a factor of 2.
+    # The thesis's figures for its own method depend on where its alpha shape happened to close, so
+    # only their order of magnitude is asserted: a factor of 2.
     printed = table_4_4.loc[(name, "thesis"), "thesis prints (W, Y)"]
     assert printed / 2 < eps["thesis"] < printed * 2
 
 # %% [markdown]
 # ## Why U-Fo's 13.6 is a matter of units
 #
-# Where all clouds are in one unit, NMD(Y) / NMD(W) is NMD(Y) / NMD(X) times NMD(X) / NMD(W). So
+# If all points are in one unit, NMD(Y) / NMD(W) is NMD(Y) / NMD(X) times NMD(X) / NMD(W). So
 # epsilon(W, Y) at a block is at most (1 + epsilon(X, Y)) (1 + epsilon(W, X)) - 1, with the same
-# neighbours throughout. With the thesis's epsilon(X, Y) of 0.09 on average and the 0.017 of doing
-# nothing, epsilon(W, Y) is about 0.11 at most. It prints 13.65. A factor of 14.6 between Y and W
-# gives just that, and the colour bars of its figure 4.4 say so: NMD(W) 0.02 to 0.038, NMD(Y) of
-# U-Fo 0.103 to 0.755. X and Y were compared in one unit, W and Y in two.
+# neighbours throughout. The thesis's epsilon(X, Y) is 0.09 on average, and the folded body itself
+# scores 0.017, so epsilon(W, Y) is about 0.11 at most. The thesis prints 13.65. A factor of 14.6
+# between the units of Y and W gives exactly that. The colour bars of the thesis's figure 4.4 show
+# the same: NMD(W) is 0.02 to 0.038, NMD(Y) of U-Fo 0.103 to 0.755. The thesis compared X and Y in
+# one unit, W and Y in two.
 
 # %%
 X, W = bodies["sim_case_1"]
@@ -325,7 +327,7 @@ one, two, three = (
 bound = (1 + two) * (1 + three) - 1
 print(f"epsilon(W, Y) {one.mean():.4f}, bound {bound.mean():.4f}, at most {bound.max():.3f}")
 assert (one <= bound + 1e-12).all()
-assert (1 + 0.0905) * (1 + 0.0172) - 1 < 0.12  # what the thesis's own figures allow
+assert (1 + 0.0905) * (1 + 0.0172) - 1 < 0.12  # the bound by the thesis's own figures
 factor = 14.6475  # 1 + 13.6475
 in_two_units = gu.epsilon(W, factor * Y).mean()
 print(f"epsilon(W, {factor} Y) = {in_two_units:.2f}; the thesis prints 13.65")

@@ -17,9 +17,9 @@
 #
 # The thesis judges an unfolding by the neighbour mean distance (NMD, its equation 2.2), the mean
 # distance of a block to its 26 nearest neighbours, and by epsilon (2.4), the relative change of
-# that distance. Here several answers, wrong ones on purpose among them, are scored by epsilon and
-# by what it cannot see: the distance from the truth after the best rigid motion, the spacing along
-# each axis, and the distances between far blocks.
+# that distance. This notebook scores several answers, some of them wrong on purpose, by epsilon and
+# by figures for what epsilon misses: the distance from the truth after the best rigid motion, the
+# spacing along each axis, and the distances between far blocks.
 #
 # The body is `sim_case_1`: 60 x 60 x 6 blocks of 10 m, laid out flat (the truth W) and folded by
 # flexural slip (X).
@@ -41,14 +41,14 @@ thesis = gu.unfold(X, method="thesis", allow_uncertified=True)
 # %% [markdown]
 # ## Answers
 #
-# - **nothing**: the folded body as it is.
-# - **rolled**: the truth rolled up by a quarter turn, layers sliding as in flexural slip. As wrong
-#   as an unfolding can be: it *adds* a fold.
+# - **nothing**: the folded body itself.
+# - **rolled**: the truth rolled up by a quarter turn, with layers that slide as in flexural slip.
+#   This is as wrong as an unfolding can be: it *adds* a fold.
 # - **mirrored**: the truth upside down. Every layer is in the wrong order.
-# - **stretched**: 5 % longer in x, as much shorter in y.
-# - **scaled**: 2 % larger in every direction.
-# - **thesis**: the thesis's own method, as geounfold has it.
-# - **geounfold**: defaults.
+# - **stretched**: the truth, 5 % longer in x and as much shorter in y.
+# - **scaled**: the truth, 2 % larger in every direction.
+# - **thesis**: the thesis's own method, as geounfold implements it.
+# - **geounfold**: the sheet method with its defaults.
 
 
 # %%
@@ -89,17 +89,18 @@ table = pd.DataFrame(
 table.sort_values("epsilon(W, Y)").style.format("{:.4f}")
 
 # %% [markdown]
-# ## What epsilon says
+# ## By epsilon
 #
-# By epsilon(W, Y) the mirrored body is *perfect*, and a body stretched by 5 % scores a tenth of
-# what doing nothing does: longer one way and shorter the other, the mean distance stays. Doing
-# nothing scores as the thesis's method does, which lies thirty times nearer to the truth. And by
-# epsilon(X, Y), all that there is where no truth is known, nothing beats doing nothing.
+# By epsilon(W, Y) the mirrored body is *perfect*. A body stretched by 5 % scores a tenth of what
+# the folded body scores: it is longer one way and shorter the other, so the mean distance stays.
+# The folded body scores as the thesis's method does, although that method comes thirty times nearer
+# to the truth. If no truth is known, only epsilon(X, Y) is left, and by it no answer is better than
+# the folded body itself.
 
 # %%
 eps = table["epsilon(W, Y)"]
 assert eps["mirrored"] < 1e-12  # a reflection keeps every distance
-# The first-order change cancels in a square lattice; 5 % of 5 %, 0.0025, is what is left.
+# The first-order change cancels in a square lattice; 5 % of 5 %, 0.0025, remains.
 assert eps["stretched"] < 0.0025
 assert abs(eps["scaled"] - 0.02) < 1e-9  # every distance by 2 %, by construction
 assert eps["stretched"] < eps["nothing"] / 8
@@ -108,12 +109,12 @@ assert table.loc["nothing", "epsilon(X, Y)"] == 0
 assert (table.drop("nothing")["epsilon(X, Y)"] > 0).all()
 
 # %% [markdown]
-# ## What the others say
+# ## By the other figures
 #
-# RMS is no friend of mirrored, stretched or folded bodies; the spacing along the axes says *how*
-# a body is wrong. The thesis's method keeps x and y and is 6 % too thick: vertical pairing takes
-# the vertical thickness of dipping layers for the true one. Dips are 0 to 30 degrees, and the
-# vertical thickness 1 to 1.15 times the true.
+# RMS is large for mirrored, stretched and folded bodies; the spacing along the axes shows *how* a
+# body is wrong. The thesis's method keeps x and y and is 6 % too thick, because vertical pairing
+# takes the vertical thickness of dipping layers for the true thickness. Dips are 0 to 30 degrees,
+# and the vertical thickness is 1 to 1.15 times the true one.
 
 # %%
 rms = table["RMS from W, m"]
@@ -129,10 +130,10 @@ assert np.abs(spacing - 1).max() < 0.001
 rank = table[["epsilon(W, Y)", "RMS from W, m"]].rank()
 print(rank)
 print(f"rank correlation {rank.corr().iloc[0, 1]:.2f}")
-assert rank.corr().iloc[0, 1] < 0.6  # two orders of merit that hardly agree
+assert rank.corr().iloc[0, 1] < 0.6  # the two rankings hardly agree
 
 # %% [markdown]
-# The rolled body, which nobody would take for the truth, beside the stretched one. Colours are
+# The rolled body is obviously wrong; the stretched body stands beside it. The colours are
 # epsilon(W, Y) on the same scale.
 
 # %%
@@ -155,8 +156,8 @@ Image(
 # %% [markdown]
 # ## NMD itself
 #
-# What NMD does show is the rim: blocks there have neighbours on one side only. Inside, it is one
-# number for every block, folded or not.
+# NMD shows the edge of the body, the rim: blocks there have neighbours on one side only. Inside, it
+# is one number for every block, folded or not.
 
 # %%
 ids = gu.neighbours(W)
@@ -173,8 +174,8 @@ Image(png(draw_body(X, folded, "NMD of the folded body, m", colours="cividis")))
 # %% [markdown]
 # ## One figure per axis
 #
-# Spacing per axis sees what a mean over all neighbours cannot. Here it is over a range of
-# stretches that leave the area as it is: epsilon is flat at the bottom, spacing is not.
+# Spacing per axis shows what a mean over all neighbours hides. The table has both over a range of
+# stretches that keep the area: near a stretch of 1, epsilon hardly changes, but the spacing does.
 
 # %%
 stretches = np.linspace(0.94, 1.06, 7)

@@ -15,14 +15,14 @@
 # %% [markdown]
 # # Cross-check of meshes
 #
-# geounfold's control mesh is made of prisms along the normals of the mid surface, and what happens
-# inside it follows from them. This notebook asks two meshers that know nothing of prisms, fTetWild
-# and, where it is installed, TetGen, to fill the same border. Our map lays the border flat; the
-# inside follows by a rule of its own: each flat coordinate harmonic over the folded shape, or the
-# whole as rigid as possible (ARAP). Then the blocks are carried by the other mesh, and compared.
+# geounfold's control mesh is made of prisms along the normals of the mid surface, and the prisms
+# determine the map inside. This notebook fills the same border with two meshers that use no prisms:
+# fTetWild and, if it is installed, TetGen. geounfold's map lays the border flat. The inside follows
+# by a rule of its own: each flat coordinate is harmonic over the folded shape, or the whole is as
+# rigid as possible (ARAP). The other mesh then carries the blocks, and the places are compared.
 #
-# The body has limbs of 70 degrees and a hinge whose radius is not much larger than the layer is
-# thick: a hard case for such rules, and one with a truth.
+# The body has limbs of 70 degrees, and the radius of its hinge is not much larger than the layer's
+# thickness: a hard case for such rules, with a known truth.
 
 # %%
 import numpy as np
@@ -44,9 +44,9 @@ u
 # %% [markdown]
 # ## Volumes and borders
 #
-# The sum of the tetrahedra's signed volumes against the exact volume inside the border (divergence
-# theorem). The prisms and TetGen keep the border; fTetWild may move it by its envelope, a tenth of
-# a block. Distances between the borders are in blocks, both ways.
+# The table compares the sum of the tetrahedra's signed volumes with the exact volume inside the
+# border (divergence theorem). The prisms and TetGen keep the border; fTetWild may move it by its
+# envelope, a tenth of a block. Distances between the borders are in blocks, both ways.
 
 # %%
 table = check.table
@@ -63,8 +63,8 @@ assert (meshes.inverted == 0).all()
 # %% [markdown]
 # ## Elements
 #
-# Prisms are all alike, none of them flat; fTetWild optimises for regular tetrahedra; TetGen, held
-# to the border's triangles, leaves some slivers.
+# The prisms are all alike, and none is flat. fTetWild optimises for regular tetrahedra. TetGen must
+# keep the border's triangles and leaves some slivers.
 
 # %%
 grids = check.grids
@@ -79,11 +79,11 @@ middle = float(np.median(X[:, 1]))
 Image(png(draw_cuts(dict(grids), 1, middle)))
 
 # %% [markdown]
-# ## Where the blocks come to lie
+# ## Places of the blocks
 #
-# `rms`, `p95` and `max` are distances from where our map places a block, in blocks.
-# `rms_same_interior` is what is left when the control mesh itself is given the same rule for its
-# inside: the part that is due to the mesh.
+# `rms`, `p95` and `max` are distances between the places by the other mesh and by geounfold's map,
+# in blocks. For `rms_same_interior` the control mesh itself gets the same rule for its inside, so
+# this distance is due to the mesh alone.
 
 # %%
 figures = ["mesh", "interior", "rms", "p95", "max", "along_layers", "across_layers"]
@@ -95,15 +95,15 @@ assert (others.outside == 0).all()
 assert (others.rms_same_interior < 0.1).all()  # measured 0.02 to 0.04: meshes hardly matter
 
 # %% [markdown]
-# Meshes agree within a few hundredths of a block. The rules do not agree with flexural slip, and
-# on this body by more than a quarter of a block: that is no fault of a mesh, since the control mesh
-# shows the same. Where a layer between the radii $r_1$ and $r_2$ is bent, its true height is
-# $r - r_1$, and the harmonic one
+# The meshes agree within a few hundredths of a block. The rules differ from flexural slip, on this
+# body by more than a quarter of a block. The mesh is not the cause, because the control mesh gives
+# the same difference. In a layer bent between the radii $r_1$ and $r_2$ the true height is $r -
+# r_1$. The harmonic height is
 #
 # $$ (r_2 - r_1) \, \frac{\ln (r / r_1)}{\ln (r_2 / r_1)}, $$
 #
-# higher by about $t^2 / 8R$ in the middle of a layer of thickness $t$ and mean radius $R$. Blocks
-# lie too far out on the convex side, at the hinges, and by nothing on straight limbs.
+# which is higher by about $t^2 / 8R$ in the middle of a layer of thickness $t$ and mean radius $R$.
+# At the hinges, blocks lie too far out on the convex side; on straight limbs they do not.
 
 # %%
 name = "tetwild_harmonic"
@@ -111,8 +111,8 @@ apart = check.differences[name]
 Image(png(draw_bodies(X, u.points, apart, f"{name}: difference, blocks", colours="cividis")))
 
 # %% [markdown]
-# Predicted against found: the formula, for the control mesh's thickness and the body's tightest
-# hinge, is the most that heights can differ. The hinge is that tight at one place only.
+# The formula, for the control mesh's thickness and the body's tightest hinge, gives the largest
+# possible difference of heights. The hinge is that tight at one place only.
 
 # %%
 s = np.linspace(0, CASES["steep"].length, 2001)
@@ -127,9 +127,9 @@ print(f"heights differ by at most {bound:.1f} m as predicted, {change:.1f} m as 
 assert bound / 2 < change < bound  # measured two thirds of it
 
 # %% [markdown]
-# ## Which one is right
+# ## Distance from the truth
 #
-# The truth decides: root mean square distance from W after the best rigid motion, in blocks.
+# The cell prints the root mean square distance from W after the best rigid motion, in blocks.
 
 # %%
 ours = gu.aligned_rms(u.points, W) / check.block

@@ -15,14 +15,15 @@
 # %% [markdown]
 # # Does it pay?
 #
-# Unfolding exists to estimate better. One run of the study that `make study` repeats over bodies,
-# seeds and spacings of holes, looked at closely: grades are simulated in the true flat space of a
-# simulated body, drilled in the folded one, and kriged at blocks in arms that differ by nothing but
-# the coordinates. The truth is known at every block, and so is the ceiling: the same estimation in
-# the true flat coordinates.
+# The purpose of unfolding is better estimation. `make study` repeats one experiment over bodies,
+# seeds and spacings of holes; this notebook shows one run of it. Grades are simulated in the true
+# flat space of a simulated body, drilled in the folded space, and kriged at blocks. The arms of the
+# study differ by the coordinates only. The truth is known at every block, and so is the ceiling:
+# the same estimation in the true flat coordinates.
 #
 # The body is `recumbent`: a sheet folded back over itself, with a limb upside down. Holes are 50 m
-# apart, seed 0. Kriging needs the extra `geostat`; without it those cells say so and do nothing.
+# apart, seed 0. Kriging needs the extra `geostat`; without it, those cells print a line and do
+# nothing else.
 
 # %%
 import sys
@@ -54,9 +55,9 @@ u
 # %% [markdown]
 # ## Grades
 #
-# A rough field: spherical, a range of 200 m along the layer and 25 m across it, mean 1 and standard
-# deviation 0.4. It follows the layer wherever the fold takes it: on the left as it lies in the
-# ground, on the right as geounfold lays it flat.
+# The field is rough: spherical, with a range of 200 m along the layer and 25 m across it, mean 1
+# and standard deviation 0.4. It follows the layer through the fold. The left picture has it in the
+# ground, the right one in geounfold's flat space.
 
 # %%
 field = study.field_of("rough", SEED)
@@ -66,8 +67,8 @@ Image(png(draw_bodies(body.folded, u.points, grades, "grade", colours="cividis")
 # %% [markdown]
 # ## Samples, and their variograms in both spaces
 #
-# Vertical holes, composites of 4 m. Along is the horizontal plane and across the vertical: of the
-# ground on the left, of the layers on the right.
+# The holes are vertical, the composites 4 m long. "Along" is the horizontal plane and "across" the
+# vertical direction: of the ground in the left picture, of the layers in the right one.
 
 # %%
 pattern = PATTERNS[SEED % len(PATTERNS)]
@@ -97,15 +98,14 @@ along = {space: m.model.ranges[0] for space, m in found.models.items()}
 across = {space: m.model.ranges[2] for space, m in found.models.items()}
 ratio = {space: along[space] / across[space] for space in along}
 print(ratio)
-# The field's own ratio is 200 over 25; one realisation of few ranges gives it within a factor of 2.
+# The field's own ratio is 200 / 25; one realisation of few ranges gives it within a factor of 2.
 assert 4 < ratio["unfolded"] < 16
 assert ratio["unfolded"] > 1.5 * ratio["folded"]
 
 # %% [markdown]
 # ## By layer
 #
-# What a geologist asks first has an answer only where layers are known: grades by stratigraphic
-# height.
+# A geologist first looks at grades by stratigraphic height, which exists only if layers are known.
 
 # %%
 Image(png(drawn["layers"]))
@@ -113,10 +113,10 @@ Image(png(drawn["layers"]))
 # %% [markdown]
 # ## The arms
 #
-# `folded_best` is the best of nine settings of range and direction in the folded space, judged by
-# the truth: no user could do as well. `stratigraphic` has x, y and the true height between bottom
-# and top. All have the same samples, the same automatic fit of a variogram and the same 24
-# neighbours. RMSE is over 600 blocks drawn from the body; grades have a deviation of 0.4.
+# `folded_best` is the best of nine settings of range and direction in the folded space, chosen by
+# the truth, which no user knows. `stratigraphic` has x, y and the true height between bottom and
+# top. All arms have the same samples, the same automatic fit of a variogram and the same 24
+# neighbours. RMSE is over 600 blocks drawn from the body; grades have a standard deviation of 0.4.
 
 # %%
 if KRIGES:
@@ -144,8 +144,9 @@ else:
 picture
 
 # %% [markdown]
-# Kriging in the unfolded space does what kriging in the true one does; the best folded setting is
-# far from it. One run can lie on either side of the ceiling: its error is that of 600 blocks.
+# Kriging in the unfolded space has the error of kriging in the true one; the best folded setting
+# has a much larger error. One run can lie on either side of the ceiling, because 600 blocks leave a
+# sampling error.
 
 # %%
 if KRIGES:
@@ -160,9 +161,9 @@ else:
 # %% [markdown]
 # ## All runs
 #
-# One run proves little. `data/study.csv` holds the runs made so far by `make study`. The share is
-# what of the possible gain, from `folded_best` to `truth`, an arm reaches; between low and high lie
-# 95 % of its means over seeds drawn with replacement.
+# One run proves little. `data/study.csv` holds all runs of `make study`. The share is the part of
+# the possible gain, from `folded_best` to `truth`, that an arm reaches. 95 % of its means over
+# seeds drawn with replacement lie between low and high.
 
 # %%
 runs = pd.read_csv(ROOT / "data/study.csv")
@@ -184,8 +185,8 @@ for name in parts:
     assert share.loc["gain geounfold", "low"] > 0
 
 # %% [markdown]
-# By body. Stratigraphic coordinates keep x and y: on the recumbent body, whose limbs lie above one
-# another, they gain less than on any other.
+# The last table has the gains by body. Stratigraphic coordinates keep x and y, so they gain least
+# on the recumbent body, where one limb lies above the other.
 
 # %%
 by_body = {key: tables.shares(tables.means(part)) for key, part in runs.groupby(["field", "body"])}

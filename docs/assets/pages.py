@@ -1,4 +1,4 @@
-"""Pages that are made: every command's help, as the program prints it."""
+"""Pages that the build makes: the help of every command, as the program prints it."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def test_the_links_of_the_readme_lead_somewhere() -> None:  # those of the pages
 
 def test_files_and_targets_that_the_pages_name_exist() -> None:
     text = "\n".join(page.read_text() for page in (README, *PAGES))
-    paths = set(re.findall(r"\b(?:data|notebooks|tests)/[\w./]*\w", text))
+    paths = set(re.findall(r"\b(?:data|geounfold|notebooks|tests)/[\w./]*\w", text))
     targets = set(re.findall(r"(?:`|\$ )make ([\w-]+)", text))
     made = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.M))
     assert len(paths) > 1

@@ -116,11 +116,13 @@ def check_whole(
     low: int | None = None,
     high: int | None = None,
     *,
+    word: str | None = None,
     none: bool = False,
 ) -> None:
     """Raise OptionError unless an option's value is a whole number in its range.
 
-    Parameters as in `check_number`, both bounds in the range.
+    Parameters as in `check_number`, both bounds in the range; ``word`` is a text that is valid
+    too.
 
     Examples
     --------
@@ -128,11 +130,12 @@ def check_whole(
     Traceback (most recent call last):
     geounfold.errors.OptionError: neighbours must be a whole number of 1 or more, but is 0
     """
-    if none and value is None:
+    if (none and value is None) or (word is not None and isinstance(value, str) and value == word):
         return
     if not (_is_number(value, Integral) and _within(value, low, high, False, False)):
         range_ = _range_words(low, high, False, False)
-        raise _refusal(name, f"a whole number{range_}", value, none)
+        also = "" if word is None else f", {word!r}"
+        raise _refusal(name, f"a whole number{range_}{also}", value, none)
 
 
 def check_one_of(name: str, value: object, valid: Iterable[str], *, none: bool = False) -> None:

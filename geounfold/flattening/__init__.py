@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geounfold.errors import FlatteningError, OptionError
+from geounfold.errors import FlatteningError, OptionError, check_one_of
 from geounfold.flattening._problem import Problem, collapsed, make_problem, upright
 from geounfold.flattening._repair import one_to_one
 from geounfold.flattening._result import Flattening, Stop
@@ -42,6 +42,7 @@ __all__ = [
     "SpringOptions",
     "Stop",
     "UfoOptions",
+    "check_flattener_options",
     "flatten",
     "tutte",
 ]
@@ -153,13 +154,10 @@ def flatten(
     >>> flat.flips, flat.overlaps, str(flat.stop)
     (0, 0, 'converged')
     """
-    if method not in FLATTENERS:
-        raise OptionError(f"unknown flattener {method!r}, choose from {', '.join(FLATTENERS)}")
+    check_one_of("flattener", method, FLATTENERS)
+    check_flattener_options(method, options)
     flattener = FLATTENERS[method]
     chosen = flattener.options() if options is None else options
-    if not isinstance(chosen, flattener.options):
-        wanted, given = flattener.options.__name__, type(chosen).__name__
-        raise OptionError(f"{method} takes options of type {wanted}, not {given}")
     problem = _problem(mesh, rest, flattener)
     begin = _checked_start(start, len(problem.mesh.V), problem.mesh.F)
     flat = flattener.function(problem, begin, chosen)
@@ -171,6 +169,16 @@ def flatten(
             "another method"
         )
     return one_to_one(problem, flat, isometric) if repair else flat
+
+
+def check_flattener_options(name: str, options: object) -> None:
+    """Raise OptionError unless options are None or those of a flattener in FLATTENERS."""
+    wanted = FLATTENERS[name].options
+    if options is not None and not isinstance(options, wanted):
+        raise OptionError(
+            f"flattener_options must be {wanted.__name__}, the options of {name}, or None, but is "
+            f"{type(options).__name__}"
+        )
 
 
 def tutte(mesh: TriMesh | tuple[Floats, Ints], rest: ArrayLike | None = None) -> Floats:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
-from geounfold.errors import BackendError, OptionError
+from geounfold.errors import BackendError
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import History, Problem, displacement
 from geounfold.flattening._result import Stop
 from geounfold.flattening.measures import symmetric_dirichlet
@@ -17,33 +16,9 @@ from geounfold.geometry.mesh import Floats
 ISOMETRY = 4.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class InjectiveOptions:
-    """Options of ``slim`` and ``scaf``.
-
-    Parameters
-    ----------
-    tol : float
-        Stop where a step moves no vertex by more than this share of the surface's size.
-    energy_tol : float
-        Stop where a step lowers the energy by no more than this share of its excess over an
-        isometry's, 4.
-    max_iter : int
-        Largest number of steps.
-    """
-
-    tol: float = 1e-6
-    energy_tol: float = 1e-4
-    max_iter: int = 200
-
-    def __post_init__(self) -> None:
-        name = type(self).__name__
-        for key in ("tol", "energy_tol"):
-            value = getattr(self, key)
-            if not (np.isfinite(value) and value > 0):
-                raise OptionError(f"{name}: {key} must be positive, but is {value}")
-        if self.max_iter < 1:
-            raise OptionError(f"{name}: max_iter must be at least 1, but is {self.max_iter}")
+#: A descent ends if a step lowers the energy by no more than this share of its excess over an
+#: isometry's.
+ENERGY_TOL = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +36,9 @@ def descend(
     problem: Problem,
     uv: Floats,
     step: Callable[[], Floats],
-    options: InjectiveOptions,
+    options: IterationOptions,
     sound: Callable[[Floats], bool],
+    energy_tol: float = ENERGY_TOL,
 ) -> Run:
     """Step until nothing moves; stop before the first step that fails or is not sound.
 
@@ -74,10 +50,13 @@ def descend(
         The start: sound.
     step : callable
         Returns the next positions, (n, 2); BackendError where it fails.
-    options : InjectiveOptions
+    options : IterationOptions
         When to stop.
     sound : callable
         Whether positions may be kept.
+    energy_tol : float
+        Stop if a step lowers the energy by no more than this share of its excess over an
+        isometry's.
     """
     V, F = problem.mesh.V, problem.mesh.F
     history = History.empty(problem)
@@ -95,7 +74,7 @@ def descend(
         moved = displacement(uv, after)
         uv, before, energy = after, energy, symmetric_dirichlet(V, F, after)
         history.record(uv, energy)
-        quiet = 0 <= before - energy <= options.energy_tol * (energy - ISOMETRY)
+        quiet = 0 <= before - energy <= energy_tol * (energy - ISOMETRY)
         if quiet or moved <= options.tol * problem.size:
             return Run(uv, count, Stop.CONVERGED, history)
     return Run(uv, options.max_iter, Stop.MAX_ITER, history)

@@ -8,7 +8,8 @@ from dataclasses import replace
 from geounfold.backends.slim_scaf import SlimSteps
 from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._border import is_one_to_one, turned_over
-from geounfold.flattening._checked_descent import InjectiveOptions, Run, descend
+from geounfold.flattening._checked_descent import Run, descend
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import History, Problem, finish
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._start import tutte
@@ -17,7 +18,8 @@ from geounfold.flattening.measures import symmetric_dirichlet
 from geounfold.geometry.mesh import Floats
 
 #: When the descents of the ladder stop: their energy then is within a few per cent of its least.
-_ENOUGH = InjectiveOptions(tol=1e-3, energy_tol=1e-2, max_iter=50)
+_ENOUGH = IterationOptions(tol=1e-3, max_iter=50)
+_ENOUGH_ENERGY = 1e-2
 
 
 def one_to_one(problem: Problem, flat: Flattening, isometric: bool) -> Flattening:
@@ -92,7 +94,7 @@ def _slim_run(problem: Problem, uv: Floats) -> tuple[Run, Floats]:
         return True
 
     try:
-        run = descend(problem, uv, SlimSteps(problem.mesh.V, F, uv), _ENOUGH, sound)
+        run = descend(problem, uv, SlimSteps(problem.mesh.V, F, uv), _ENOUGH, sound, _ENOUGH_ENERGY)
     except BackendError as err:
         run = Run(uv, 0, Stop.STALLED, _one_record(problem, uv), f"{err}")
     return run, last

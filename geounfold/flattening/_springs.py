@@ -8,22 +8,23 @@ import scipy.sparse as sp
 from geounfold.geometry.mesh import Floats, Ints
 
 
-def spring_energy(uv: Floats, edges: Ints, rest: Floats, stiffness: float = 1.0) -> float:
-    """Return E = sum over edges of C/2 (|P_i P_j| - d_j)^2 (thesis section 2.2.4).
+def spring_energy(uv: Floats, edges: Ints, rest: Floats) -> float:
+    """Return E = sum over edges of C/2 (|P_i P_j| - d_j)^2, C = 1 (thesis section 2.2.4).
 
-    Each edge counts once; the thesis's sum over vertices counts it twice.
+    Each edge counts once; the thesis's sum over vertices counts it twice.  C scales the energy
+    and changes no minimum.
     """
     stretch = np.linalg.norm(uv[edges[:, 1]] - uv[edges[:, 0]], axis=1) - rest
-    return float(stiffness / 2 * (stretch @ stretch))
+    return float((stretch @ stretch) / 2)
 
 
-def spring_forces(uv: Floats, edges: Ints, rest: Floats, stiffness: float = 1.0) -> Floats:
-    """Return f(P_i) = sum_j C (|P_i P_j| - d_j) n_ij, (n, 2): minus the energy's gradient.
+def spring_forces(uv: Floats, edges: Ints, rest: Floats) -> Floats:
+    """Return f(P_i) = sum_j (|P_i P_j| - d_j) n_ij, (n, 2): minus the energy's gradient.
 
     An edge of no length pulls nowhere.
     """
     along, length = _directions(uv, edges)
-    pull = (stiffness * (length - rest))[:, None] * along
+    pull = (length - rest)[:, None] * along
     n = len(uv)
     columns = [
         np.bincount(edges[:, 0], pull[:, k], n) - np.bincount(edges[:, 1], pull[:, k], n)

@@ -9,6 +9,10 @@ from geounfold.flattening._linear import PinnedSolver, edge_laplacian, incidence
 from geounfold.flattening._problem import Problem, displacement, edge_of_side, flip_count
 from geounfold.geometry.mesh import Floats
 
+#: The rigid steps end if one moves no vertex by more than this share of the surface's size, or
+#: after so many.
+TOL, STEPS = 1e-3, 60
+
 
 class RigidSteps:
     """Local-global steps of the ARAP energy on rest triangles (Liu et al. 2008).
@@ -54,21 +58,16 @@ class RigidSteps:
         return centred
 
 
-def relax(
-    step: RigidSteps, uv: Floats, problem: Problem, tol: float, max_iter: int
-) -> tuple[Floats, Floats | None, int]:
-    """Return the positions after some steps, the last ones without flips, and the steps taken.
-
-    Steps end where none moves a vertex by more than ``tol`` of the surface's size.
-    """
+def relax(step: RigidSteps, uv: Floats, problem: Problem) -> tuple[Floats, Floats | None, int]:
+    """Return the positions after some steps, the last ones without flips, and the steps taken."""
     F = problem.mesh.F
     unfolded = None if flip_count(uv, F) else uv
-    for count in range(1, max_iter + 1):
+    for count in range(1, STEPS + 1):
         after = step(uv)
         moved = displacement(uv, after)
         uv = after
         if flip_count(uv, F) == 0:
             unfolded = uv
-        if moved <= tol * problem.size:
+        if moved <= TOL * problem.size:
             return uv, unfolded, count
-    return uv, unfolded, max_iter
+    return uv, unfolded, STEPS

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from geounfold.backends import igl as backend
-from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.errors import BackendError, FlatteningError
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._start import tutte
@@ -19,25 +18,11 @@ RECORD = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArapOptions:
-    """Options of ``arap``.
-
-    Parameters
-    ----------
-    tol : float
-        Stop where a step moves no vertex by more than this share of the surface's size.
-    max_iter : int
-        Largest number of local-global steps.
-    """
+class ArapOptions(IterationOptions):
+    """Options of ``arap``."""
 
     tol: float = 1e-6
     max_iter: int = 1000
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.tol) and self.tol > 0):
-            raise OptionError(f"arap: tol must be positive, but is {self.tol}")
-        if self.max_iter < 1:
-            raise OptionError(f"arap: max_iter must be at least 1, but is {self.max_iter}")
 
 
 def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flattening:

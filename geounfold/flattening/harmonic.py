@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from geounfold.backends import geodesics as backend
-from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._border import is_one_to_one
 from geounfold.flattening._problem import History, Problem, finish
 from geounfold.flattening._result import Flattening, Stop
@@ -13,35 +13,18 @@ from geounfold.flattening._start import circle, tutte
 from geounfold.flattening.measures import symmetric_dirichlet
 from geounfold.geometry.mesh import Floats
 
-WEIGHTS = ("cotangent", "uniform")
-
 
 @dataclass(frozen=True, kw_only=True)
 class HarmonicOptions:
-    """Options of ``harmonic``.
-
-    Parameters
-    ----------
-    weights : str
-        ``cotangent``: the map of least Dirichlet energy; ``uniform``: Tutte's embedding, every
-        vertex the mean of its neighbours.
-    """
-
-    weights: str = "cotangent"
-
-    def __post_init__(self) -> None:
-        if self.weights not in WEIGHTS:
-            raise OptionError(
-                f"harmonic: weights must be one of {', '.join(WEIGHTS)}, but is {self.weights}"
-            )
+    """Options of ``harmonic``: it has none."""
 
 
 def harmonic(problem: Problem, start: Floats | None, options: HarmonicOptions) -> Flattening:
     """Map onto the disk of the surface's area, the border spaced by its lengths.
 
-    Uniform weights make a one-to-one map (Tutte 1963).  Cotangent weights may be negative at
-    obtuse angles and then fold triangles; such a map is dropped for Tutte's, and the note says
-    so.  Both are direct solves, so a start changes nothing.
+    The map has the least Dirichlet energy: its weights are cotangents.  These may be negative at
+    obtuse angles and then fold triangles.  Tutte's embedding (1963), which is one-to-one, replaces
+    such a map, with a note.  Both are direct solves, so a start changes nothing.
 
     Parameters
     ----------
@@ -50,18 +33,17 @@ def harmonic(problem: Problem, start: Floats | None, options: HarmonicOptions) -
     start : (n, 2) float or None
         Not used.
     options : HarmonicOptions
-        See there.
+        None.
     """
     V, F, outer = problem.mesh.V, problem.mesh.F, problem.loops[0]
     uv, note = None, ""
-    if options.weights == "cotangent":
-        try:
-            scaled = (V - V.mean(axis=0)) / problem.size
-            uv = backend.harmonic(scaled, F, outer, circle(problem, outer))
-        except BackendError as err:
-            note = f"{err}: Tutte's embedding instead"
-        if uv is not None and not is_one_to_one(uv, F, problem.loops):
-            uv, note = None, "cotangent weights fold triangles: Tutte's embedding instead"
+    try:
+        scaled = (V - V.mean(axis=0)) / problem.size
+        uv = backend.harmonic(scaled, F, outer, circle(problem, outer))
+    except BackendError as err:
+        note = f"{err}: Tutte's embedding instead"
+    if uv is not None and not is_one_to_one(uv, F, problem.loops):
+        uv, note = None, "cotangent weights fold triangles: Tutte's embedding instead"
     uv = tutte(problem) if uv is None else uv
     if not is_one_to_one(uv, F, problem.loops):
         raise FlatteningError(

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from geounfold.errors import OptionError
+from geounfold.errors import check_whole
 from geounfold.flattening._classical_scaling import by_distances, to_landmarks
 from geounfold.flattening._problem import Problem
 from geounfold.flattening._result import Flattening
@@ -38,10 +38,8 @@ class IsomapOptions:
     landmarks: int = 300
 
     def __post_init__(self) -> None:
-        for name, least in (("neighbours", 1), ("landmarks", 3)):
-            value = getattr(self, name)
-            if value < least:
-                raise OptionError(f"isomap: {name} must be at least {least}, but is {value}")
+        check_whole("flattener_options.neighbours", self.neighbours, 1)
+        check_whole("flattener_options.landmarks", self.landmarks, 3)
 
 
 def isomap(problem: Problem, start: Floats | None, options: IsomapOptions) -> Flattening:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from geounfold.backends.slim_scaf import ScaffoldSteps
 from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._border import is_one_to_one
-from geounfold.flattening._checked_descent import InjectiveOptions, Run, descend
+from geounfold.flattening._checked_descent import Run, descend
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import Problem, finish
 from geounfold.flattening._result import Flattening
 from geounfold.flattening._start import tutte
@@ -15,8 +16,10 @@ from geounfold.geometry.mesh import Floats
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScafOptions(InjectiveOptions):
-    """Options of ``scaf``; see InjectiveOptions."""
+class ScafOptions(IterationOptions):
+    """Options of ``scaf``."""
+
+    tol: float = 1e-6
 
     max_iter: int = 100
 
@@ -54,7 +57,7 @@ def scaf(problem: Problem, start: Floats | None, options: ScafOptions) -> Flatte
     return finish(problem, run.uv, "scaf", run.stop, run.steps, run.history, notes)
 
 
-def scaffold_run(problem: Problem, uv: Floats, options: InjectiveOptions) -> Run:
+def scaffold_run(problem: Problem, uv: Floats, options: IterationOptions) -> Run:
     """Return the descent from one-to-one positions; FlatteningError where libigl cannot begin."""
     F, loops = problem.mesh.F, problem.loops
     try:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from geounfold.backends.slim_scaf import SlimSteps
 from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._border import turned_over
-from geounfold.flattening._checked_descent import InjectiveOptions, descend
+from geounfold.flattening._checked_descent import descend
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import Problem, finish
 from geounfold.flattening._result import Flattening
 from geounfold.flattening._start import tutte
@@ -15,8 +16,11 @@ from geounfold.geometry.mesh import Floats
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlimOptions(InjectiveOptions):
-    """Options of ``slim``; see InjectiveOptions."""
+class SlimOptions(IterationOptions):
+    """Options of ``slim``."""
+
+    tol: float = 1e-6
+    max_iter: int = 200
 
 
 def slim(problem: Problem, start: Floats | None, options: SlimOptions) -> Flattening:

@@ -10,8 +10,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from geounfold.backends.slim_scaf import SlimSteps
-from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.errors import BackendError, FlatteningError
 from geounfold.flattening._flip_barrier import FoldGuard
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._linear import PinnedSolver, edge_laplacian, factor, preconditioned_solve
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
@@ -34,6 +35,9 @@ PATIENCE = 12
 #: embedding of a sheet has about as much.
 PLANAR = 0.25
 
+#: Edge strain (root mean square) of a given start above which rigid steps come first.
+NEAR = 0.05
+
 #: Steps of SLIM before the barrier is added, where the start is far from its rest lengths.
 NEARER = 10
 
@@ -51,49 +55,24 @@ RIDGE = 1e-8
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringOptions:
+class SpringOptions(IterationOptions):
     """Options of ``spring``.
 
     Parameters
     ----------
-    stiffness : float
-        Spring constant C: it scales the energy, not the answer.
     tol : float
-        Stop where the last step moved no vertex by more than this share of the surface's size
-        and lowered the energy by no more than this share of itself.
+        Stop if a step moves no vertex by more than this share of the surface's size and lowers
+        the energy by no more than this share of itself.
     max_iter : int
-        Largest number of Newton steps.
-    warm_strain : float
-        Edge strain (root mean square) of a given start above which rigid steps come first.
-    warm_tol : float
-        Largest displacement, as a share of the size, at which the rigid steps end.
-    warm_max_iter : int
-        Largest number of rigid steps.
-    guard : bool
-        Whether a result with flipped triangles is redone with a barrier against folding.
+        Most Newton steps.
     """
 
-    stiffness: float = 1.0
     tol: float = 1e-7
     max_iter: int = 60
-    warm_strain: float = 0.05
-    warm_tol: float = 1e-3
-    warm_max_iter: int = 60
-    guard: bool = True
-
-    def __post_init__(self) -> None:
-        for name in ("stiffness", "tol", "warm_strain", "warm_tol"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise OptionError(f"spring: {name} must be positive, but is {value}")
-        for name, least in (("max_iter", 1), ("warm_max_iter", 0)):
-            value = getattr(self, name)
-            if value < least:
-                raise OptionError(f"spring: {name} must be at least {least}, but is {value}")
 
 
 def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Flattening:
-    """Flatten by minimising ``E = sum C/2 (|P_i P_j| - d_j)^2`` (thesis section 2.2.4).
+    """Flatten by minimising ``E = sum (|P_i P_j| - d_j)^2 / 2`` (thesis section 2.2.4, C = 1).
 
     A start of its own, or one far from its rest lengths, is first relaxed by a few rigid (ARAP)
     steps; then Newton's method minimises the springs' energy, with the exact Hessian where that
@@ -119,18 +98,17 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
         step's energy; with the barrier it includes the barrier's.
     """
     first = _own_start(problem) if start is None else start
-    near = 0.0 if start is None else options.warm_strain
-    warm, unfolded, rigid, solver = _warm_start(problem, first, options, near)
+    near = 0.0 if start is None else NEAR
+    warm, unfolded, rigid, solver = _warm_start(problem, first, near)
     place = solver.place
     system = _System(problem, place, rough=solver.solve if rigid else None)
     history = History.empty(problem)
-    history.record(first, options.stiffness * system.energy(first))
-    patience = PATIENCE if options.guard else options.max_iter
-    uv, steps, stop = _descend(system, warm, options, history, patience)
+    history.record(first, system.energy(first))
+    uv, steps, stop = _descend(system, warm, options, history, PATIENCE)
     if not np.isfinite(uv).all():
         raise FlatteningError("spring: the flat positions are not finite")
     flips = flip_count(uv, problem.mesh.F)
-    if flips == 0 or not options.guard:
+    if flips == 0:
         note = f"{rigid} rigid steps first" if rigid else ""
         return finish(problem, uv, "spring", stop, rigid + steps, history, note)
     return _guarded(problem, place, unfolded, flips, rigid + steps, options)
@@ -152,10 +130,10 @@ def _guarded(
                 f"spring: the springs fold {flips} triangles over, and Tutte's embedding has "
                 "triangles too small to tell from folded ones: remesh the surface"
             )
-        unfolded = _warm_start(problem, unfolded, options, options.warm_strain)[1]
+        unfolded = _warm_start(problem, unfolded, NEAR)[1]
         if unfolded is None:  # Tutte's embedding itself has no flips
             raise FlatteningError("spring: no start without flipped triangles was found")
-    unfolded = _nearer(problem, unfolded, options)
+    unfolded = _nearer(problem, unfolded)
     history = History.empty(problem)
     system = _System(problem, place, FoldGuard(problem.mesh.F, problem.areas))
     uv, steps, stop = _descend(system, unfolded, options, history, options.max_iter)
@@ -176,12 +154,12 @@ def _strain(problem: Problem, uv: Floats) -> float:
     return float(np.sqrt(np.mean(strain * strain)))
 
 
-def _nearer(problem: Problem, uv: Floats, options: SpringOptions) -> Floats:
+def _nearer(problem: Problem, uv: Floats) -> Floats:
     """Return a start without flips brought near its rest lengths by a few steps of SLIM.
 
     The barrier lets Newton's method creep only, from a start far from its rest lengths.
     """
-    if not problem.own or _strain(problem, uv) <= options.warm_strain:
+    if not problem.own or _strain(problem, uv) <= NEAR:
         return uv
     try:
         step, after = SlimSteps(problem.mesh.V, problem.mesh.F, uv), uv
@@ -193,7 +171,7 @@ def _nearer(problem: Problem, uv: Floats, options: SpringOptions) -> Floats:
 
 
 def _warm_start(
-    problem: Problem, start: Floats, options: SpringOptions, near: float
+    problem: Problem, start: Floats, near: float
 ) -> tuple[Floats, Floats | None, int, PinnedSolver]:
     """Return the relaxed start, the last one without flips, the steps taken and a Laplacian.
 
@@ -201,11 +179,11 @@ def _warm_start(
     """
     F, n = problem.mesh.F, len(problem.mesh.V)
     unfolded = None if flip_count(start, F) else start
-    if _strain(problem, start) <= near or not options.warm_max_iter:
+    if _strain(problem, start) <= near:
         graph = edge_laplacian(problem.edges, np.ones(len(problem.edges)), n)
         return start, unfolded, 0, PinnedSolver(graph)
     rigid = RigidSteps(problem)
-    uv, flat, steps = relax(rigid, start, problem, options.warm_tol, options.warm_max_iter)
+    uv, flat, steps = relax(rigid, start, problem)
     return uv, flat, steps, rigid.laplacian
 
 
@@ -333,18 +311,18 @@ def _descend(
 
     Folded triangles end it after ``patience`` steps: springs that crumple converge slowly.
     """
-    tol, size, scale = options.tol, system.problem.size, options.stiffness
+    tol, size = options.tol, system.problem.size
     # Energy of a strain of tol everywhere: below it, exactly developable surfaces are done.
     floor = tol**2 * float((system.problem.rest**2).sum()) / 2
     energy = system.energy(uv)
-    history.record(uv, scale * energy)
+    history.record(uv, energy)
     for count in range(1, options.max_iter + 1):
         after, lower, predicted = _one_step(system, uv, energy)
         moved = displacement(uv, after)
         small = tol * (lower + floor)
         quiet = energy - lower <= small and (lower < energy or predicted <= small)
         uv, energy = after, lower
-        history.record(uv, scale * energy)
+        history.record(uv, energy)
         if quiet and moved <= tol * size:
             return uv, count, Stop.CONVERGED
         if moved == 0 or (count >= patience and flip_count(uv, system.problem.mesh.F)):

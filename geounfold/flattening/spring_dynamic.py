@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.errors import FlatteningError, OptionError
+from geounfold.errors import FlatteningError, check_number, check_one_of
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import (
     History,
     Problem,
@@ -28,69 +29,53 @@ WINDOW = 50
 #: Relative length below which a change is rounding, not a rebound.
 ROUNDING = 1e-12
 
-#: Values of ``stop_rule`` and ``initial``.
+#: Valid values of ``stop_rule``.
 STOP_RULES = ("converged", "thesis")
-INITIAL = ("relaxed", "tutte", "plane")
+
+#: Share of the velocity lost in each step, by stop rule: the thesis's equations have no damping.
+DAMPING = {"converged": 0.01, "thesis": 0.0}
+
+#: ``time_step^2 w^2`` for a bound ``w`` on the fastest oscillation, by stop rule.  The thesis's
+#: integrator gains energy at a quarter of it per step; the default damping takes more than 0.01
+#: away.  The thesis gives no time step: with 0.05 its rule ends in the 8 to 20 steps it shows.
+STEP = {"converged": 0.01, "thesis": 0.05}
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringDynamicOptions:
+class SpringDynamicOptions(IterationOptions):
     """Options of ``spring_dynamic``.
 
     Parameters
     ----------
-    stiffness : float
-        Spring constant C.
-    density : float
-        Mass of one square unit of the surface.
-    damping : float or None
-        Share of the velocity lost in each step, 0 to 1; None takes 0.01, or 0 with the
-        thesis's stop rule (its equations have no damping).
-    time_step : float or None
-        Time step; None takes the one that makes ``time_step^2 w^2 = 0.01`` for a bound ``w`` on
-        the fastest oscillation: the thesis's integrator gains energy at a rate of that product
-        over 4 per step, and the default damping takes more away.  With the thesis's stop rule
-        0.05: the thesis gives no time step, and this one ends in the 8 to 20 steps it shows.
     stop_rule : str
-        ``converged``: over 50 steps the energy changed by at most ``tol`` of itself and no
-        vertex moved more than ``tol`` of the surface's size.  ``thesis``: at the first step
-        that raises the energy or the area error; the positions before it are kept.
+        ``converged``: see ``tol``.  ``thesis``: at the first step that raises the energy or the
+        area error; the positions before it are kept.
+    damping : float or None
+        Share of the velocity lost in each step; None takes 0.01, or 0 with the thesis's stop rule.
+    time_step : float or None
+        In units of the square root of the mass of a square unit over the spring constant: of the
+        thesis's C, density and time step nothing else matters.  None takes the one that makes
+        ``(time_step w)^2 = 0.01``, or 0.05 with the thesis's stop rule, for a bound ``w`` on the
+        fastest oscillation.
     tol : float
-        See ``stop_rule``.
+        Stop if over 50 steps the energy changes by at most this share of itself and no vertex
+        moves by more than this share of the surface's size.
     max_iter : int
-        Largest number of time steps.
-    initial : str or None
-        Start where none is given: ``relaxed``, Tutte's embedding after a few rigid (ARAP)
-        steps; ``tutte`` itself, from which springs often fold over; ``plane``, the projection on
-        the best-fit plane as in the thesis.  None takes ``relaxed``, or ``plane`` with the
-        thesis's stop rule.
+        Most time steps.
     """
 
-    stiffness: float = 1.0
-    density: float = 1.0
+    stop_rule: str = "converged"
     damping: float | None = None
     time_step: float | None = None
-    stop_rule: str = "converged"
     tol: float = 1e-5
     max_iter: int = 5_000
-    initial: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "density", "tol", "time_step"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise OptionError(f"spring_dynamic: {name} must be positive, but is {value}")
-        if self.damping is not None and not 0 <= self.damping < 1:
-            raise OptionError(f"spring_dynamic: damping must be in [0, 1), but is {self.damping}")
-        if self.max_iter < 1:
-            raise OptionError(
-                f"spring_dynamic: max_iter must be at least 1, but is {self.max_iter}"
-            )
-        for name, valid in (("stop_rule", STOP_RULES), ("initial", (None, *INITIAL))):
-            if getattr(self, name) not in valid:
-                names = ", ".join(str(v) for v in valid)
-                given = getattr(self, name)
-                raise OptionError(f"spring_dynamic: {name} must be one of {names}, not {given!r}")
+        super().__post_init__()
+        name = "flattener_options."
+        check_one_of(f"{name}stop_rule", self.stop_rule, STOP_RULES)
+        check_number(f"{name}damping", self.damping, 0, 1, high_open=True, none=True)
+        check_number(f"{name}time_step", self.time_step, 0, low_open=True, none=True)
 
 
 def spring_dynamic(
@@ -98,7 +83,7 @@ def spring_dynamic(
 ) -> Flattening:
     """Flatten by the motion of point masses joined by springs (thesis section 2.2.4).
 
-    With the force ``f_i = sum_j C (|P_i P_j| - d_j) n_ij`` and the mass m_i of a third of the
+    With the force ``f_i = sum_j (|P_i P_j| - d_j) n_ij`` and the mass m_i of a third of the
     surface around each vertex,
 
     ``a = f / m``, ``v(t + dt) = (1 - damping) (v(t) + dt a)``,
@@ -113,7 +98,8 @@ def spring_dynamic(
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes ``options.initial``.
+        Flat positions to start from; None takes Tutte's embedding after a few rigid (ARAP) steps,
+        or, with the thesis's stop rule, the projection on the best-fit plane.
     options : SpringDynamicOptions
         See there.
     """
@@ -130,13 +116,13 @@ def spring_dynamic(
 
 
 def _initial(problem: Problem, options: SpringDynamicOptions) -> Floats:
-    """Return the start that the options name."""
-    kind = options.initial or ("plane" if options.stop_rule == "thesis" else "relaxed")
-    if kind == "tutte":
-        return tutte(problem)
-    if kind == "relaxed":
-        return relax(RigidSteps(problem), tutte(problem), problem, 1e-3, 60)[0]
-    return plan(problem)
+    """Return the projection on a plane, as in the thesis, or Tutte's embedding relaxed.
+
+    From Tutte's embedding itself the springs often fold over.
+    """
+    if options.stop_rule == "thesis":
+        return plan(problem)
+    return relax(RigidSteps(problem), tutte(problem), problem)[0]
 
 
 class Motion:
@@ -147,7 +133,7 @@ class Motion:
     problem : Problem
         The surface.
     options : SpringDynamicOptions
-        Stiffness, density, damping and time step.
+        Damping and time step.
     method : str
         Whose motion it is, for errors.
     """
@@ -155,22 +141,21 @@ class Motion:
     def __init__(
         self, problem: Problem, options: SpringDynamicOptions, method: str = "spring_dynamic"
     ) -> None:
-        self.problem, self.stiffness, self._method = problem, options.stiffness, method
+        self.problem, self._method = problem, method
         n = len(problem.mesh.V)
-        self._mass = options.density * vertex_sum(problem.areas, problem.mesh.F, n) / 3
-        # Gershgorin: no oscillation is faster than w^2 = max 2 C degree / m.
+        self._mass = vertex_sum(problem.areas, problem.mesh.F, n) / 3
+        # Gershgorin: no oscillation is faster than w^2 = max 2 degree / m.
         degree = np.bincount(problem.edges.ravel(), minlength=n)
-        fastest = float((2 * options.stiffness * degree / self._mass).max())
-        thesis = options.stop_rule == "thesis"
-        self._dt = options.time_step or float(np.sqrt((0.05 if thesis else 0.01) / fastest))
-        default = 0.0 if thesis else 0.01
+        fastest = float((2 * degree / self._mass).max())
+        self._dt = options.time_step or float(np.sqrt(STEP[options.stop_rule] / fastest))
+        default = DAMPING[options.stop_rule]
         self._keep = 1 - (default if options.damping is None else options.damping)
         self._velocity = np.zeros((n, 2))
 
     def step(self, uv: Floats) -> Floats:
         """Return the positions one time step later."""
         p, dt = self.problem, self._dt
-        force = spring_forces(uv, p.edges, p.rest, self.stiffness)
+        force = spring_forces(uv, p.edges, p.rest)
         acceleration = force / self._mass[:, None]
         after: Floats = uv + dt * self._velocity + dt * dt / 2 * acceleration
         self._velocity = self._keep * (self._velocity + dt * acceleration)
@@ -182,7 +167,7 @@ class Motion:
 
     def energy(self, uv: Floats) -> float:
         """Return the springs' energy, or FlatteningError where the motion has blown up."""
-        value = spring_energy(uv, self.problem.edges, self.problem.rest, self.stiffness)
+        value = spring_energy(uv, self.problem.edges, self.problem.rest)
         if not np.isfinite(value):
             raise FlatteningError(
                 f"{self._method}: the motion diverged; take a smaller time step or more damping"
@@ -195,7 +180,7 @@ def _run(
 ) -> tuple[Floats, int, Stop]:
     """Step until energy and positions rest."""
     p = motion.problem
-    floor = options.tol**2 * options.stiffness * float((p.rest**2).sum()) / 2
+    floor = options.tol**2 * float((p.rest**2).sum()) / 2
     energy = motion.energy(uv)
     history.record(uv, energy)
     anchor = uv
@@ -220,7 +205,7 @@ def _run_thesis(
     p = motion.problem
     energy = motion.energy(uv)
     area = relative_area_error(uv, p.mesh.F, p.areas)
-    scale = options.stiffness * float((p.rest**2).sum()) / 2
+    scale = float((p.rest**2).sum()) / 2
     history.record(uv, energy)
     for count in range(1, options.max_iter + 1):
         after = motion.step(uv)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geounfold.errors import FlatteningError, OptionError
+from geounfold.errors import FlatteningError, check_number
+from geounfold.flattening._iteration import IterationOptions
 from geounfold.flattening._problem import History, Problem, displacement, finish, flip_count
 from geounfold.flattening._result import Flattening, Stop
 from geounfold.flattening._start import plan
@@ -19,43 +20,28 @@ RISE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class UfoOptions:
+class UfoOptions(IterationOptions):
     """Options of ``ufo``.
 
     Parameters
     ----------
-    stiffness : float
-        Spring constant C.
-    density : float
-        Mass of one square unit of the surface.
     time_step : float or None
-        Time step; None takes that of ``spring_dynamic`` with the thesis's stop rule.
+        In the unit of that of ``spring_dynamic``; None takes the one that flattener has with the
+        thesis's stop rule.
     tol : float
-        Stop where 50 steps changed the energy by at most this share of itself and moved no vertex
-        by more than this share of the surface's size.
+        Stop if over 50 steps the energy changes by at most this share of itself and no vertex
+        moves by more than this share of the surface's size.
     max_iter : int
-        Largest number of time steps.
-    releases : int or None
-        Most releases; 1 ends where the energy first rises, as the thesis does; None goes on until
-        nothing moves.
+        Most time steps.
     """
 
-    stiffness: float = 1.0
-    density: float = 1.0
     time_step: float | None = None
     tol: float = 1e-5
     max_iter: int = 5_000
-    releases: int | None = None
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "density", "tol", "time_step"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise OptionError(f"ufo: {name} must be positive, but is {value}")
-        for name in ("max_iter", "releases"):
-            value = getattr(self, name)
-            if value is not None and value < 1:
-                raise OptionError(f"ufo: {name} must be at least 1, but is {value}")
+        super().__post_init__()
+        check_number("flattener_options.time_step", self.time_step, 0, low_open=True, none=True)
 
 
 def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flattening:
@@ -69,7 +55,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
 
     * Each release ends where the springs' energy rises, and the next one starts there at rest,
       until nothing moves.  The kinetic energy taken away is what is released: without damping
-      the motion would never end.  ``releases=1`` is the thesis's single release.
+      the motion would never end.  The thesis ends with the first release.
     * The area error, at whose rise the thesis stops too, ends nothing: it may rise on the way.
 
     From ``spring`` it differs by all that makes that one safe: there are no rigid steps first, no
@@ -93,12 +79,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
     """
     motion = Motion(
         problem,
-        SpringDynamicOptions(
-            stiffness=options.stiffness,
-            density=options.density,
-            time_step=options.time_step,
-            stop_rule="thesis",
-        ),
+        SpringDynamicOptions(time_step=options.time_step, stop_rule="thesis"),
         "ufo",
     )
     history = History.empty(problem)
@@ -115,11 +96,11 @@ def _release(
 ) -> tuple[Floats, int, Stop]:
     """Step until energy and positions rest, the velocity taken away wherever the energy rises."""
     p, tol = motion.problem, options.tol
-    scale = options.stiffness * float((p.rest**2).sum()) / 2
+    scale = float((p.rest**2).sum()) / 2
     energy = motion.energy(uv)
     history.record(uv, energy)
     anchor, before = uv, energy
-    fallen = releases = 0
+    fallen = 0
     for count in range(1, options.max_iter + 1):
         after = motion.step(uv)
         value = motion.energy(after)
@@ -127,10 +108,7 @@ def _release(
             uv, energy, fallen = after, value, fallen + 1
         elif fallen:
             motion.still()
-            fallen, releases = 0, releases + 1
-            if releases == options.releases:
-                history.record(uv, energy)
-                return uv, count, Stop.THESIS_RULE
+            fallen = 0
         elif value > energy * (1 + RISE):
             raise FlatteningError(
                 "ufo: the energy rises in the first step from rest; take a smaller time step"

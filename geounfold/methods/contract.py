@@ -50,6 +50,8 @@ class PreparedBody:
         Which surface is to be flat; sides as in ``split``.
     flattener : str
         A name in FLATTENERS.
+    flattener_options : dataclass or None
+        The flattener's options; None for its defaults.
     reach : float
         How far past the body points are to be carried, in blocks.
     options : Any
@@ -70,6 +72,7 @@ class PreparedBody:
     up: Floats
     datum: str
     flattener: str
+    flattener_options: Any
     reach: float
     options: Any
     sheet_options: SheetOptions
@@ -78,7 +81,8 @@ class PreparedBody:
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
         """Lay a surface flat by the chosen flattener, as the answer comes."""
-        return flatten(mesh, self.flattener, start=start, repair=False)
+        how = self.flattener_options
+        return flatten(mesh, self.flattener, start=start, options=how, repair=False)
 
 
 @dataclass(frozen=True, eq=False)

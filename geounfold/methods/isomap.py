@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from geounfold.errors import FlatteningError, InputError, OptionError
+from geounfold.errors import FlatteningError, InputError, check_whole
 from geounfold.flattening._classical_scaling import scaled
 from geounfold.geometry.measures import vertex_normals
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
@@ -29,40 +29,35 @@ _OWN = 1e-9  # blocks: a point this near to a block is the block
 _HASH = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
 
+# Unfolding.jl's own numbers:
+_NEAR = 50  # placed points that a block keeps its distances to
+_ROUNDS = 4  # rounds in which blocks are placed, each by the blocks of those before it
+_LARGEST = 2.5  # blocks: one whose distance to a neighbour is further off is placed again
+
+
 @dataclass(frozen=True, kw_only=True)
 class IsomapMethodOptions:
-    """Options of ``isomap``; the numbers are Unfolding.jl's.
+    """Options of ``isomap``; the defaults are Unfolding.jl's.
 
     Parameters
     ----------
     neighbours : int
-        Of each point of the mid surface in the graph.
+        Neighbours of each point of the mid surface in the graph.
     landmarks : int
-        Points of the mid surface whose distances to all others are measured; fewer where the
-        surface has fewer.
-    near : int
-        Placed points that a block keeps its distances to.
-    rounds : int
-        Blocks are placed in so many rounds, each by the blocks of those before it.
-    largest : float
-        A block whose distance to one of its neighbours is off by more than this, in blocks, is
-        placed again in the next round and places no others.
+        Points of the mid surface from which distances are measured; all if there are no more.
+
+    Raises
+    ------
+    OptionError
+        A value out of its range.
     """
 
     neighbours: int = 16
     landmarks: int = 1500
-    near: int = 50
-    rounds: int = 4
-    largest: float = 2.5
 
     def __post_init__(self) -> None:
-        for name, least in (("neighbours", 3), ("landmarks", 4), ("near", 4), ("rounds", 1)):
-            if getattr(self, name) < least:
-                raise OptionError(
-                    f"isomap: {name} must be at least {least}, but is {getattr(self, name)}"
-                )
-        if not (np.isfinite(self.largest) and self.largest > 0):
-            raise OptionError(f"isomap: largest must be positive, but is {self.largest}")
+        check_whole("isomap_options.neighbours", self.neighbours, 3)
+        check_whole("isomap_options.landmarks", self.landmarks, 4)
 
 
 def fit_isomap(body: PreparedBody) -> BodyFit:
@@ -96,8 +91,8 @@ def fit_isomap(body: PreparedBody) -> BodyFit:
         mid = TriMesh(mesh.layers.P, mesh.layers.F)
         uv, count = landmark_isomap(mid.V, options)
         uv = _onto(uv, mid, mesh.layers.flat)
-        placed = _placed(body.points, mid, uv, options)
-        rule = NeighbourRule(np.concatenate([mid.V, body.points]), placed, options, sheet)
+        placed = _placed(body.points, mid, uv)
+        rule = NeighbourRule(np.concatenate([mid.V, body.points]), placed, sheet)
         folded = {name: pair[0] for name, pair in sheet.mesh.surfaces.items()}
         return by_rule(body, sheet, rule, folded, {"reference": len(mid.V), "landmarks": count})
 
@@ -161,30 +156,28 @@ def _onto(uv: Floats, mid: TriMesh, flat: Floats) -> Floats:
     return register(uv, flat, np.ones(len(uv)))
 
 
-def _placed(P: Floats, mid: TriMesh, uv: Floats, options: IsomapMethodOptions) -> Floats:
+def _placed(P: Floats, mid: TriMesh, uv: Floats) -> Floats:
     """Return the flat places of the mid surface's points and of blocks, (m + n, 3)."""
     known = np.column_stack([uv, np.zeros(len(uv))])
     flat = _first_guess(P, mid, known)
-    part = _rounds(P, options.rounds)
-    for number in range(options.rounds):
+    part = _rounds(P)
+    for number in range(_ROUNDS):
         before = np.flatnonzero(part < number)
         good = np.ones(len(before), dtype=bool)
-        if len(before) > options.near:
-            good = _sound(P[before], flat[before], options)
+        if len(before) > _NEAR:
+            good = _sound(P[before], flat[before])
         again = np.sort(np.concatenate([np.flatnonzero(part == number), before[~good]]))
         held = before[good]
-        tree = _Known(
-            np.concatenate([mid.V, P[held]]), np.concatenate([known, flat[held]]), options.near
-        )
+        tree = _Known(np.concatenate([mid.V, P[held]]), np.concatenate([known, flat[held]]))
         flat[again] = tree.place(P[again], flat[again])
     return np.concatenate([known, flat])
 
 
-def _rounds(P: Floats, count: int) -> Ints:
+def _rounds(P: Floats) -> Ints:
     """Return the round that places each point, (n,): drawn by its place alone."""
     cell = np.floor(P * 8 + 0.318).astype(np.int64)
     mixed = np.bitwise_xor.reduce(cell * _HASH, axis=1)
-    return np.asarray((mixed ^ (mixed >> 13)) % count, dtype=np.int64)
+    return np.asarray((mixed ^ (mixed >> 13)) % _ROUNDS, dtype=np.int64)
 
 
 def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
@@ -197,14 +190,14 @@ def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
     return out
 
 
-def _sound(P: Floats, flat: Floats, options: IsomapMethodOptions) -> Bools:
+def _sound(P: Floats, flat: Floats) -> Bools:
     """Return the points whose distances to their neighbours are off by no more than allowed."""
-    near = np.asarray(cKDTree(P).query(P, k=options.near)[1], dtype=np.int64)
+    near = np.asarray(cKDTree(P).query(P, k=_NEAR)[1], dtype=np.int64)
     out = np.ones(len(P), dtype=bool)
     for start in range(0, len(P), _CHUNK):
         rows = slice(start, start + _CHUNK)
         before, after = (np.linalg.norm(Q[near[rows]] - Q[rows, None], axis=2) for Q in (P, flat))
-        off = np.abs(after - before) > options.largest
+        off = np.abs(after - before) > _LARGEST
         out[rows] &= ~off.any(axis=1)
         out[near[rows][off]] = False
     return out
@@ -216,14 +209,12 @@ class _Known:
     Parameters
     ----------
     P, flat : (n, 3) float
-        The points in both spaces.
-    near : int
-        How many of the nearest count, ties included.
+        The points in both spaces; the nearest 50 of a point count, ties included.
     """
 
-    def __init__(self, P: Floats, flat: Floats, near: int) -> None:
-        self._flat, self._near = flat, min(near, len(P))
-        self._count = min(near + _SPARE, len(P))
+    def __init__(self, P: Floats, flat: Floats) -> None:
+        self._flat, self._near = flat, min(_NEAR, len(P))
+        self._count = min(_NEAR + _SPARE, len(P))
         self._tree = cKDTree(P)
 
     def nearest(self, Q: Floats) -> tuple[Floats, Floats]:
@@ -285,22 +276,19 @@ class NeighbourRule:
     ----------
     known, placed : (n, 3) float
         The points in both spaces.
-    options : IsomapOptions
-        As used.
     sheet : SheetResult
         Whose top and bottom give the stratigraphic coordinate.
     """
 
     known: Floats
     placed: Floats
-    options: IsomapMethodOptions
     sheet: SheetResult = field(repr=False)
 
     way_back = False
 
     @cached_property
     def _tree(self) -> _Known:
-        return _Known(self.known, self.placed, self.options.near)
+        return _Known(self.known, self.placed)
 
     def to_flat(self, points: Floats) -> Placed:
         """Place folded points: at their own place where they are known, else by distances."""

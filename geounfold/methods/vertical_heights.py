@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geounfold.backends.igl import SurfaceIndex
-from geounfold.errors import OptionError, SplitError
+from geounfold.errors import SplitError, check_one_of
 from geounfold.geometry.measures import unit
 from geounfold.geometry.mesh import Bools, Floats, TriMesh
 from geounfold.mapping.control_mesh import Datum
@@ -23,20 +23,24 @@ _CLEAR = 1.0  # blocks: rays start so far off
 
 @dataclass(frozen=True, kw_only=True)
 class VerticalOptions:
-    """Options of the methods that keep x and y: ``shear`` and ``stratigraphic``.
+    """Options of ``shear`` and ``stratigraphic``.
 
     Parameters
     ----------
     axis : str
-        What is vertical: ``up``, the direction given as up, or ``across``, the axis of the block
-        lattice (or the principal axis) across the body.
+        Vertical is ``up``, the direction given as up, or ``across``, the lattice's (of scattered
+        points the principal) axis across the body.
+
+    Raises
+    ------
+    OptionError
+        Another name.
     """
 
     axis: str = "up"
 
     def __post_init__(self) -> None:
-        if self.axis not in ("up", "across"):
-            raise OptionError(f"vertical: axis must be up or across, but is {self.axis!r}")
+        check_one_of("vertical_options.axis", self.axis, ("up", "across"))
 
 
 class Heights(NamedTuple):

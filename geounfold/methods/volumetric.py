@@ -8,7 +8,7 @@ import numpy as np
 
 from geounfold.backends.igl import upright
 from geounfold.backends.slim_scaf import SlimTets
-from geounfold.errors import BackendError, FlatteningError, OptionError
+from geounfold.errors import BackendError, FlatteningError, check_number, check_whole
 from geounfold.geometry.mesh import Floats, TetMesh, TriMesh
 from geounfold.mapping.control_mesh import ControlMesh, Datum
 from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair
@@ -24,10 +24,14 @@ class VolumetricOptions:
     max_iter : int
         Most steps; one takes about 60 microseconds per tetrahedron.
     tol : float
-        Stops once no vertex moves by more than this share of a block.
+        Stop if a step moves no vertex by more than this, in blocks.
     weight : float
-        Of the mean square distance, in blocks, of top and bottom from the planes that they are
-        drawn to, against the mean energy.
+        Weight of top's and bottom's mean square distance (blocks) from their planes.
+
+    Raises
+    ------
+    OptionError
+        A value out of its range.
     """
 
     max_iter: int = 6
@@ -35,12 +39,9 @@ class VolumetricOptions:
     weight: float = 100.0
 
     def __post_init__(self) -> None:
-        if self.max_iter < 1:
-            raise OptionError(f"volumetric: max_iter must be at least 1, but is {self.max_iter}")
-        for name in ("tol", "weight"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise OptionError(f"volumetric: {name} must be positive, but is {value}")
+        check_whole("volumetric_options.max_iter", self.max_iter, 1)
+        check_number("volumetric_options.tol", self.tol, 0, low_open=True)
+        check_number("volumetric_options.weight", self.weight, 0, low_open=True)
 
 
 def fit_volumetric(body: PreparedBody) -> BodyFit:

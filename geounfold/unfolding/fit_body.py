@@ -115,6 +115,7 @@ def _fit_at(
         up=up,
         datum=OTHER_SIDE.get(options.datum, options.datum) if over else options.datum,
         flattener=options.flattener,
+        flattener_options=options.flattener_options,
         reach=options.reach,
         options=getattr(options, method.options),
         sheet_options=options.sheet_options,

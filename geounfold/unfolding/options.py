@@ -1,15 +1,20 @@
-"""What can be chosen for an unfolding; every value is checked when the options are made."""
+"""Options of an unfolding; every value is checked when the options are made."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import numpy as np
-
-from geounfold.errors import OptionError
-from geounfold.flattening import FLATTENERS
+from geounfold.errors import (
+    OptionError,
+    check_flag,
+    check_number,
+    check_numbers,
+    check_one_of,
+    check_options,
+    check_whole,
+)
+from geounfold.flattening import FLATTENERS, check_flattener_options
 from geounfold.mapping.control_mesh import DATUMS
 from geounfold.mapping.mesh_map import REACH
 from geounfold.mapping.prism_coordinates import COORDINATES
@@ -28,13 +33,17 @@ VALID: dict[str, tuple[str, ...]] = {
     "datum": DATUMS,
     "coordinates": COORDINATES,
 }
-"""Valid values of the options that have names for them."""
+"""Valid values of the options that take a name."""
 
-
-def _one_of(name: str, value: str, valid: Iterable[str]) -> None:
-    valid = tuple(valid)
-    if value not in valid:
-        raise OptionError(f"unknown {name} {value!r}; valid: {', '.join(valid)}")
+STAGES: dict[str, type] = {
+    "hull_options": HullOptions,
+    "sheet_options": SheetOptions,
+    "thesis_options": ThesisOptions,
+    "vertical_options": VerticalOptions,
+    "volumetric_options": VolumetricOptions,
+    "isomap_options": IsomapMethodOptions,
+}
+"""Classes of the options of single stages and methods."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,45 +53,52 @@ class UnfoldOptions:
     Parameters
     ----------
     method : str
-        ``sheet`` (ours); ``thesis`` (vertical pairing, flat at mean heights); ``ufo`` (blocks
-        anchored to one flattened surface along its normals); ``stratigraphic`` (proportional
-        height between bottom and top, x and y kept); ``shear`` (vertical simple shear);
-        ``volumetric`` (tetrahedra of least strain); or ``isomap`` (distances to neighbours).
-        ``stratigraphic``, ``shear`` and ``isomap`` have no control mesh to prove.
+        How the map is made.  ``sheet``: prisms along the mid surface's normals, with slip between
+        layers.  ``thesis``: vertical pairs, flat at mean heights.  ``ufo``: blocks anchored to the
+        flat mid surface along its normals.  ``volumetric``: tetrahedra of least strain.  These
+        four have a control mesh and can be proved one-to-one; the others cannot:
+        ``stratigraphic`` (height as a share of the thickness), ``shear`` (vertical simple shear),
+        ``isomap`` (distances to neighbours).
     flattener : str
-        A name in FLATTENERS.
+        What lays the reference surfaces flat.
     hull : str
-        ``auto`` or a name in HULLS.
+        What wraps the body's surface around the blocks; ``auto`` takes the first that fits.
     split : str
-        A name in SPLITS.
+        How the hull is split; ``signed`` holds on overturned folds too.
     up : (float, float, float)
-        World direction that the top (hanging wall) looks to; decided once for the body.
+        World direction, of any length, to which the top (hanging wall) looks.
     datum : str
-        Which surface is flat: ``mid``, ``top``, ``bottom``, or ``proportional`` (both).
+        Surface that becomes flat: ``mid``, ``top``, ``bottom`` or ``proportional`` (both).
     body : int, "all" or None
-        Which of several separate bodies to unfold, 0 the largest; None when there is one.
+        Body to unfold if there are several, 0 the largest; None if there is one.
     coordinates : str
-        How points go between the control mesh's vertices: by those of the tetrahedron (``tet``),
-        which is proved one-to-one, or of the prism, which is smooth inside it but not proved:
-        ``wachspress`` (mean value where a prism is not convex) or ``mvc`` (mean value).  Blocks
-        that these turn inside out, or do not bring back, are an error.
+        What carries points between the control mesh's vertices: its tetrahedra (``tet``), proved
+        one-to-one, or its prisms (``wachspress``, ``mvc``), smooth inside but not proved.
     neighbours : int
-        Neighbours per point in NMD and epsilon.
+        Neighbours per block in the figures NMD and epsilon.
     reach : float
-        How far past the control mesh points are carried, in blocks; beyond they have no image.
+        Distance from the body, in blocks, up to which other points are carried.
     allow_uncertified : bool
-        Give an answer that is not proved one-to-one, marked, instead of failing.
-    hull_options, sheet_options, thesis_options
-        The stages' own options.
+        Whether an answer that is not proved one-to-one is given, marked, and is no error.
+    flattener_options : dataclass or None
+        Options of the flattener, such as SpringOptions; None for its defaults.
+    hull_options : HullOptions
+        Options of the hulls.
+    sheet_options : SheetOptions
+        Options of ``sheet``, and of the methods that take its mid surface: all but ``thesis``.
+    thesis_options : ThesisOptions
+        Options of ``thesis``.
     vertical_options : VerticalOptions
-        Of ``stratigraphic`` and ``shear``.
-    volumetric_options, isomap_options
-        The methods' own options.
+        Options of ``stratigraphic`` and ``shear``.
+    volumetric_options : VolumetricOptions
+        Options of ``volumetric``.
+    isomap_options : IsomapMethodOptions
+        Options of ``isomap``.
 
     Raises
     ------
     OptionError
-        A value outside the valid ones, which the message lists.
+        A value out of its range; the message names the option, what is valid, and the value.
 
     Examples
     --------
@@ -101,6 +117,7 @@ class UnfoldOptions:
     neighbours: int = NEIGHBOURS
     reach: float = REACH
     allow_uncertified: bool = False
+    flattener_options: Any = None
     hull_options: HullOptions = field(default_factory=HullOptions)
     sheet_options: SheetOptions = field(default_factory=SheetOptions)
     thesis_options: ThesisOptions = field(default_factory=ThesisOptions)
@@ -110,18 +127,19 @@ class UnfoldOptions:
 
     def __post_init__(self) -> None:
         for name, valid in VALID.items():
-            _one_of(name, getattr(self, name), valid)
-        up = np.asarray(self.up, dtype=np.float64)
-        if up.shape != (3,) or not np.isfinite(up).all() or not up.any():
-            raise OptionError(f"up must be three finite numbers, not all zero, but is {self.up}")
-        if isinstance(self.body, str) and self.body != "all":
-            raise OptionError(f"body must be a number from 0 or 'all', but is {self.body!r}")
-        if isinstance(self.body, int) and self.body < 0:
-            raise OptionError(f"body must be a number from 0 or 'all', but is {self.body}")
-        if self.neighbours < 1:
-            raise OptionError(f"neighbours must be at least 1, but is {self.neighbours}")
-        if not 0 <= self.reach < np.inf:
-            raise OptionError(f"reach must be a number of blocks from 0 up, but is {self.reach}")
+            check_one_of(name, getattr(self, name), valid)
+        check_numbers("up", self.up, 3)
+        up = tuple(float(x) for x in self.up)
+        if not any(up):
+            raise OptionError(f"up must be a list of 3 numbers, not all 0, but is {list(up)}")
+        object.__setattr__(self, "up", up)
+        check_whole("body", self.body, 0, word="all", none=True)
+        check_whole("neighbours", self.neighbours, 1)
+        check_number("reach", self.reach, 0)
+        check_flag("allow_uncertified", self.allow_uncertified)
+        check_flattener_options(self.flattener, self.flattener_options)
+        for name, kind in STAGES.items():
+            check_options(name, getattr(self, name), kind)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the options as plain nested dicts."""

@@ -5,29 +5,28 @@ from __future__ import annotations
 import inspect
 import textwrap
 import tomllib
-from collections.abc import Iterator
-from dataclasses import MISSING, Field, fields, is_dataclass
-from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from numbers import Integral, Real
+from typing import Any, get_type_hints
 
 import numpy as np
 
 from geounfold._version import __version__
 from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
+from geounfold.unfolding.gone_options import gone
 from geounfold.unfolding.options import VALID, UnfoldOptions
 
 _WIDTH = 96
-_METHOD, _METHOD_OPTIONS = "flattener", "flattener_options"  # the one names the other's type
-_WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-_MANY = {float: "numbers", int: "whole numbers", bool: "true or false", str: "texts"}
+_FLATTENER = "flattener_options"  # the one table whose class depends on another option
 
 
 def template() -> str:
-    """Return every option with its default, explained, as TOML.
+    """Return every option with its default, explained, as TOML of at most 100 lines.
 
-    Read back it gives the defaults.  Options without a value are commented out, and so are those
-    of flatteners, which depend on the one chosen.
+    Read back it gives the defaults.  Options without a default value are commented out, and so are
+    those of the flatteners.
 
     Examples
     --------
@@ -35,15 +34,14 @@ def template() -> str:
     True
     """
     head = (
-        f"Options of geounfold {__version__}, with their defaults. Lines may be left out; what "
-        "the command line says goes before what stands here. None means that the line is left "
-        "out. Use: geounfold unfold --config FILE"
+        f"Options of geounfold {__version__} with their defaults. Any line may be left out; the "
+        "command line's options replace the file's. Use: geounfold unfold --config FILE"
     )
     return "\n".join([*_comment(head), "", *_section(UnfoldOptions(), (), explain=True)]) + "\n"
 
 
 def to_toml(options: UnfoldOptions) -> str:
-    """Return the TOML text that stands for these options, defaults included, bit for bit.
+    """Return options as TOML text, defaults included and numbers to the last bit.
 
     Examples
     --------
@@ -56,7 +54,7 @@ def to_toml(options: UnfoldOptions) -> str:
 
 
 def from_toml(text: str, source: str = "the configuration") -> UnfoldOptions:
-    """Return the options that a TOML text stands for; what it leaves out has its default.
+    """Return the options in a TOML text; those that it leaves out have their defaults.
 
     Parameters
     ----------
@@ -68,14 +66,16 @@ def from_toml(text: str, source: str = "the configuration") -> UnfoldOptions:
     Raises
     ------
     OptionError
-        No TOML, an option that does not exist, or a value of the wrong type or outside the valid
-        ones; the message names it and what is valid.
+        The text is no TOML, an option does not exist or is gone, or a value is out of its range.
     """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, and numbers of thousands of digits
         raise OptionError(f"{source}: not valid TOML: {error}") from error
-    made: UnfoldOptions = _made(UnfoldOptions, table, (), source)
+    try:
+        made: UnfoldOptions = _made(UnfoldOptions, table, ())
+    except OptionError as error:
+        raise OptionError(f"{source}: {error}") from error
     return made
 
 
@@ -89,56 +89,62 @@ def _section(options: Any, path: tuple[str, ...], *, explain: bool) -> Iterator[
     inner = []
     for field in fields(cls):
         value = getattr(options, field.name)
-        if is_dataclass(value) or field.name == _METHOD_OPTIONS:
+        if is_dataclass(value) or field.name == _FLATTENER:
             inner.append((field.name, value))
             continue
         if explain:
-            yield from _explained(cls, field, path, notes.get(field.name, ""))
+            yield from _comment(
+                _explained(notes.get(field.name, ""), () if path else VALID.get(field.name, ()))
+            )
         if value is not None:
             yield f"{field.name} = {_literal(value)}"
         elif explain:
-            yield f"# {field.name} = ...  ({_words(_hints(cls)[field.name])}; not set)"
+            yield f"# {field.name} = ... (not set)"
     for name, value in inner:
-        below = (*path, name)
         if is_dataclass(value):
-            yield from _head(type(value), below, explain=explain)
-            yield from _section(value, below, explain=explain)
+            yield from ("", *(_comment(_summary(type(value))) if explain else ()))
+            yield f"[{'.'.join((*path, name))}]"
+            yield from _section(value, (*path, name), explain=explain)
         elif explain:
-            for flattener in FLATTENERS.values():
-                yield from ("", f"# With {_METHOD} = {_literal(flattener.name)}:")
-                lines = [f"[{'.'.join(below)}]"]
-                lines += _section(flattener.options(), below, explain=True)
-                yield from (f"# {line}".rstrip() for line in lines)
+            yield from _of_flatteners()
 
 
-def _head(cls: type, path: tuple[str, ...], *, explain: bool) -> Iterator[str]:
+def _of_flatteners() -> Iterator[str]:
+    """Yield the lines on the options of flatteners, all of them comments."""
     yield ""
-    if explain:
-        yield from _comment(_summary(cls))
-    yield f"[{'.'.join(path)}]"
+    yield from _comment("Options of the chosen flattener: those in its line, with their defaults.")
+    yield f"# [{_FLATTENER}]"
+    for name, flattener in FLATTENERS.items():
+        options = flattener.options()
+        values = ((f.name, getattr(options, f.name)) for f in fields(options))
+        words = [n if value is None else f"{n} = {_literal(value)}" for n, value in values]
+        yield f"# {name}: {', '.join(words) or 'none'}"
 
 
-def _explained(cls: type, field: Field[Any], path: tuple[str, ...], note: str) -> list[str]:
-    """Return what the docstring says of a field, and its valid values where they have names."""
-    valid = VALID.get(field.name) if not path else None
-    if field.name == _METHOD:
-        valid = tuple(FLATTENERS)
-    words = f"{note} Valid: {', '.join(valid)}." if valid else note
-    return _comment(words) if words else []
+def _explained(note: str, valid: Sequence[str]) -> str:
+    """Return an option's description with its valid names, unless it names them itself."""
+    if all(name in note for name in valid):
+        return note
+    return f"{note} Valid: {', '.join(valid)}."
 
 
 def _comment(text: str) -> list[str]:
-    return [f"# {line}" for line in textwrap.wrap(" ".join(text.split()), _WIDTH - 2)]
+    return [
+        f"# {line}"
+        for line in textwrap.wrap(" ".join(text.split()), _WIDTH - 2, break_on_hyphens=False)
+    ]
 
 
 def _literal(value: Any) -> str:
     """Return a value as TOML; numbers to the last bit."""
-    if isinstance(value, np.ndarray | np.generic):
+    if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
+    if isinstance(value, Integral):
+        return repr(int(value))
+    if isinstance(value, Real):
+        return repr(float(value))
     if isinstance(value, str):
         kept = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08X}" for c in kept) + '"'
@@ -149,14 +155,14 @@ def _literal(value: Any) -> str:
 
 
 def _summary(cls: type) -> str:
-    """Return what a dataclass's docstring says before its first heading, as plain text."""
+    """Return a dataclass's docstring up to its first heading, as plain text."""
     lines = _doc(cls).splitlines()
     heads = [i for i, line in enumerate(lines[1:]) if line and not line.strip("-")]
     return " ".join(lines[: heads[0]] if heads else lines).replace("``", "")
 
 
 def _notes(cls: type) -> dict[str, str]:
-    """Return what numpydoc headings say of each field, own or inherited."""
+    """Return the description of each field, own or inherited, in numpydoc docstrings."""
     notes: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         names: list[str] = []
@@ -181,105 +187,29 @@ def _doc(cls: type) -> str:
 # ---------------------------------------------------------------------------------------- reading
 
 
-def _hints(cls: type) -> dict[str, Any]:
-    return get_type_hints(cls)
-
-
-def _made(cls: Any, table: dict[str, Any], path: tuple[str, ...], source: str) -> Any:
-    """Return a dataclass made of a TOML table."""
+def _made(cls: Any, table: dict[str, Any], path: tuple[str, ...]) -> Any:
+    """Return a dataclass made of a TOML table; the dataclass checks the values."""
     known = [field.name for field in fields(cls)]
-    for name in table:
+    for name, value in table.items():
         if name not in known:
+            full = ".".join((*path, name))
+            inside = f" in {'.'.join(path)}" if path else ""
             raise OptionError(
-                f"{source}: there is no option {'.'.join((*path, name))}; "
-                f"valid{' in ' + '.'.join(path) if path else ''}: {', '.join(known) or 'none'}"
+                gone(full, value)
+                or f"there is no option {full}; valid{inside}: {', '.join(known) or 'none'}"
             )
-    hints = dict(_hints(cls))
-    if _METHOD_OPTIONS in known:
-        chosen = table.get(_METHOD, _default(cls, _METHOD))
-        hints[_METHOD_OPTIONS] = _options_of(chosen, (*path, _METHOD), source)
-    values = {
-        name: _value(hints[name], value, (*path, name), source) for name, value in table.items()
-    }
-    try:
-        return cls(**values)
-    except OptionError as error:
-        place = f" [{'.'.join(path)}]" if path else ""
-        raise OptionError(f"{source}{place}: {error}") from error
+    kinds = dict(get_type_hints(cls))
+    flattener = table.get("flattener", UnfoldOptions.flattener)
+    if cls is UnfoldOptions and isinstance(flattener, str) and flattener in FLATTENERS:
+        kinds[_FLATTENER] = FLATTENERS[flattener].options
+    return cls(**{name: _value(kinds[name], value, (*path, name)) for name, value in table.items()})
 
 
-def _default(cls: Any, name: str) -> Any:
-    found = next(field for field in fields(cls) if field.name == name)
-    return None if found.default is MISSING else found.default
-
-
-def _options_of(flattener: Any, path: tuple[str, ...], source: str) -> type:
-    if not isinstance(flattener, str) or flattener not in FLATTENERS:
-        raise OptionError(
-            f"{source}: {'.'.join(path)} must be one of {', '.join(FLATTENERS)}, but is "
-            f"{_shown(flattener)}"
-        )
-    return FLATTENERS[flattener].options
-
-
-def _value(hint: Any, value: Any, path: tuple[str, ...], source: str) -> Any:
-    """Return a TOML value as the type that a field has."""
-    if is_dataclass(hint):
+def _value(kind: Any, value: Any, path: tuple[str, ...]) -> Any:
+    """Return a TOML value as a field holds it: tables as dataclasses, lists as tuples."""
+    if is_dataclass(kind):
         if isinstance(value, dict):
-            return _made(hint, value, path, source)
-        raise OptionError(
-            f"{source}: {'.'.join(path)} must be a table of options, but is {_shown(value)}"
-        )
-    for arm in _arms(hint):
-        if _fits(arm, value):
-            return _as(arm, value)
-    raise OptionError(f"{source}: {'.'.join(path)} must be {_words(hint)}, but is {_shown(value)}")
-
-
-def _arms(hint: Any) -> tuple[Any, ...]:
-    """Return the types that a hint allows, None left out: TOML has no word for it."""
-    arms = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    return tuple(arm for arm in arms if arm is not NoneType)
-
-
-def _fits(hint: Any, value: Any) -> bool:
-    if get_origin(hint) is tuple:
-        kinds = get_args(hint)
-        if not isinstance(value, list):
-            return False
-        if kinds[-1] is Ellipsis:
-            return all(_fits(kinds[0], item) for item in value)
-        return len(value) == len(kinds) and all(map(_fits, kinds, value))
-    if hint is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    return type(value) is hint
-
-
-def _as(hint: Any, value: Any) -> Any:
-    if get_origin(hint) is tuple:
-        return tuple(_as(get_args(hint)[0], item) for item in value)
-    return hint(value)
-
-
-def _words(hint: Any) -> str:
-    """Return what a type is called in a message."""
-    words = []
-    for arm in _arms(hint):
-        if get_origin(arm) is tuple:
-            kinds = get_args(arm)
-            count = "" if kinds[-1] is Ellipsis else f"{len(kinds)} "
-            words.append(f"a list of {count}{_MANY[kinds[0]]}")
-        else:
-            words.append(_WORDS[arm])
-    return " or ".join(words)
-
-
-def _shown(value: Any) -> str:
-    """Return a value as it stands in TOML, or what it is."""
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, bool | int | float | str):
-        return _literal(value)
-    if isinstance(value, list):
-        return "a list"
-    return str(value)
+            return _made(kind, value, path)
+        name = ".".join(path)
+        raise OptionError(f"{name} must be a table of options, but is {value!r}")
+    return tuple(value) if isinstance(value, list) else value

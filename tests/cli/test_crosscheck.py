@@ -76,7 +76,10 @@ def test_unfold_tells_a_disagreement_in_its_summary_and_on_stderr(folder, monkey
         (("--interiors", ""), "unknown interior: none; choose from harmonic, arap"),
         (("-o", "t.xlsx"), "t.xlsx"),
         (("-o", "p.csv"), "p.csv"),
-        (("--hull", "cube"), "unknown hull 'cube'"),
+        (
+            ("--hull", "cube"),
+            "hull must be one of auto, density, alpha, ball_pivoting, poisson, but is 'cube'",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_one_line_and_nothing_is_lost(folder, capsys, words, message):

@@ -173,7 +173,7 @@ def test_words_go_before_the_file(calls: list[UnfoldOptions]) -> None:
     ("content", "words"),
     [
         (None, "c.toml: no such file"),
-        (b"reach = 'far'", 'c.toml: reach must be a number, but is "far"'),
+        (b"reach = 'far'", "c.toml: reach must be a number of 0 or more, but is 'far'"),
         (b"hull = '\xff'", "c.toml: not valid TOML: not UTF-8 text"),
         (b"\x00", "c.toml: not valid TOML"),
     ],

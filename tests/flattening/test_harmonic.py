@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from geounfold.backends import geodesics
 from geounfold.flattening import (
-    HarmonicOptions,
     flatten,
     measures,
     tutte,
@@ -31,12 +30,6 @@ def test_harmonic_spaces_the_border_on_a_circle_of_the_surfaces_area():
     z = (around - centre[:2]) @ [1, 1j]
     turn = np.angle(np.roll(z, -1) / z)
     assert_allclose(turn, 2 * np.pi * step / step.sum(), rtol=1e-10)
-
-
-def test_harmonic_with_uniform_weights_is_tuttes_embedding():
-    mesh = cap(n=9)
-    flat = flatten(mesh, "harmonic", options=HarmonicOptions(weights="uniform"))
-    assert_allclose(flat.uv, tutte(mesh), atol=1e-15)  # the radius is 0.55
 
 
 def test_harmonic_with_cotangents_has_the_least_dirichlet_energy():

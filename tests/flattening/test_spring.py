@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import numpy as np
@@ -62,14 +63,14 @@ def test_force_is_minus_the_gradient():
     edges, rng = unique_edges(F), np.random.default_rng(3)
     rest = lengths(V, edges)
     uv = V[:, :2] + 0.03 * rng.normal(size=(len(V), 2))
-    force, step = spring_forces(uv, edges, rest, 2.0), 1e-6
+    force, step = spring_forces(uv, edges, rest), 1e-6
     for k in rng.choice(uv.size, 12, replace=False):
         d = np.zeros(uv.size)
         d[k] = step
         d = d.reshape(-1, 2)
-        slope = (
-            spring_energy(uv + d, edges, rest, 2.0) - spring_energy(uv - d, edges, rest, 2.0)
-        ) / (2 * step)
+        slope = (spring_energy(uv + d, edges, rest) - spring_energy(uv - d, edges, rest)) / (
+            2 * step
+        )
         assert -force.ravel()[k] == pytest.approx(slope, abs=1e-8)  # forces are about 0.1
 
 
@@ -95,12 +96,6 @@ def test_spring_energy_never_rises_and_it_reports_convergence():
     assert (np.diff(flat.energy) <= 0).all()
     assert flat.area_error[-1] < flat.area_error[0]
     assert flat.edge_error[-1] < flat.edge_error[0]
-
-
-def test_stiffness_scales_the_energy_alone():
-    one, three = flatten(cap(n=9)), flatten(cap(n=9), options=SpringOptions(stiffness=3.0))
-    assert np.array_equal(one.uv, three.uv)
-    assert_allclose(three.energy, 3 * one.energy)
 
 
 def test_spring_converges_in_few_steps_from_a_good_start():
@@ -138,13 +133,10 @@ def test_springs_start_from_tuttes_embedding_where_the_plan_overlaps():
     assert own.flips == 0
 
 
-def test_crumpling_springs_are_held_by_the_guard():
-    mesh = nearly_closed()
-    folded = flatten(mesh, options=SpringOptions(guard=False), repair=False)
-    flat = flatten(mesh)
-    assert folded.flips > 0
+def test_crumpling_springs_are_held_by_the_barrier():
+    flat = flatten(nearly_closed())
     assert flat.flips == 0
-    assert "barrier" in flat.note
+    assert re.search(r"the springs alone fold [1-9]\d* triangles over: .* barrier", flat.note)
 
 
 def test_a_guarded_start_far_from_its_lengths_is_brought_near_first(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from geounfold.errors import FlatteningError
 from geounfold.flattening import (
@@ -16,17 +17,16 @@ from geounfold.flattening import (
 from tests.flattening.meshes import cap, cylinder
 
 
-def test_a_single_release_of_ufo_is_the_thesiss():
+def test_ufo_goes_on_where_the_thesis_ends():
     V, F, _, _ = cylinder(angle=1.6)
-    once = flatten((V, F), "ufo", options=UfoOptions(releases=1))
-    assert once.stop is Stop.THESIS_RULE
-    # The thesis's rule ends at the same step or, where the area error rises first, before it.
     thesis = flatten((V, F), "spring_dynamic", options=SpringDynamicOptions(stop_rule="thesis"))
-    assert thesis.iterations <= once.iterations <= 20  # 18 and 19
-    assert once.energy[-1] <= thesis.energy[-1]
+    # The energy first rises in ufo's 19th step; the thesis's rule ends at the 18th, whose area
+    # error rises.
+    first = flatten((V, F), "ufo", options=UfoOptions(max_iter=thesis.iterations))
+    assert_allclose(first.energy[-1], thesis.energy[-1], rtol=0.1)
     rested = flatten((V, F), "ufo")
     assert rested.stop is Stop.CONVERGED
-    assert rested.edge_error[-1] < 1e-6 < 1e-2 < once.edge_error[-1]
+    assert rested.edge_error[-1] < 1e-6 < 1e-2 < thesis.edge_error[-1]
 
 
 def test_ufo_reaches_the_minimum_of_spring_where_its_start_is_not_folded():

@@ -191,22 +191,22 @@ def test_surfaces_leave_out_what_has_no_image():
 
 
 @pytest.mark.parametrize(
-    ("kind", "field", "value"),
+    ("kind", "name", "value", "words"),
     [
-        (VerticalOptions, "axis", "sideways"),
-        (VolumetricOptions, "max_iter", 0),
-        (VolumetricOptions, "tol", 0.0),
-        (VolumetricOptions, "weight", np.inf),
-        (IsomapMethodOptions, "neighbours", 2),
-        (IsomapMethodOptions, "landmarks", 3),
-        (IsomapMethodOptions, "near", 3),
-        (IsomapMethodOptions, "rounds", 0),
-        (IsomapMethodOptions, "largest", np.nan),
+        (VerticalOptions, "vertical_options.axis", "sideways", "one of up, across"),
+        (VolumetricOptions, "volumetric_options.max_iter", 0, "a whole number of 1 or more"),
+        (VolumetricOptions, "volumetric_options.max_iter", 1.5, "a whole number of 1 or more"),
+        (VolumetricOptions, "volumetric_options.tol", 0.0, "a number above 0"),
+        (VolumetricOptions, "volumetric_options.tol", True, "a number above 0"),
+        (VolumetricOptions, "volumetric_options.weight", np.inf, "a number above 0"),
+        (IsomapMethodOptions, "isomap_options.neighbours", 2, "a whole number of 3 or more"),
+        (IsomapMethodOptions, "isomap_options.landmarks", "3", "a whole number of 4 or more"),
     ],
 )
-def test_bad_options_are_refused(kind, field, value):
-    with pytest.raises(OptionError, match=f"{field} must be"):
-        kind(**{field: value})
+def test_bad_options_are_refused(kind, name, value, words):
+    with pytest.raises(OptionError) as refused:
+        kind(**{name.split(".")[1]: value})
+    assert str(refused.value) == f"{name} must be {words}, but is {value!r}"
 
 
 def test_the_command_line_takes_every_method(plunging, tmp_path, monkeypatch, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -181,7 +182,9 @@ def test_unsuitable_hulls_are_told_apart() -> None:
 
 
 def test_unknown_method_lists_the_valid_ones() -> None:
-    with pytest.raises(OptionError, match="unknown hull 'convex'; valid: auto, density, alpha"):
+    with pytest.raises(
+        OptionError, match=r"hull must be one of auto, density, .*, but is 'convex'"
+    ):
         extract_hull(fold(), UNIT, "convex")
 
 
@@ -201,8 +204,33 @@ def test_sparse_points_have_no_shell_or_hull() -> None:
     far = np.array([[0.0, 0, 0], [50, 0, 0], [0, 50, 0]])
     with pytest.raises(HullError, match="no outer points"):
         outer_shell(far, 0.8, 0.1)
+    between = 50.5 - 50.5 * np.eye(3)  # far from each other, and half way between grid nodes
     with pytest.raises(HullError, match="density hull has no faces"):
-        extract_hull(far, None, "density", HullOptions(level=1.5))
+        extract_hull(between, None, "density", HullOptions(level=0.99))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("level", 2, "a number between 0 and 1, but is 2"),
+        ("level", 1.0, "a number between 0 and 1, but is 1.0"),
+        ("level", np.nan, "a number between 0 and 1, but is nan"),
+        ("level", "far", "a number between 0 and 1, but is 'far'"),
+        ("level", True, "a number between 0 and 1, but is True"),
+        ("blur", 0, "a number above 0 and up to 2.5, but is 0"),
+        ("blur", [0.8], "a number above 0 and up to 2.5, but is [0.8]"),
+        ("edge", -1.5, "a number above 0, but is -1.5"),
+        ("alpha", 0, "a number above 0 or None, but is 0"),
+    ],
+)
+def test_options_are_checked(name: str, value: Any, words: str) -> None:
+    with pytest.raises(OptionError) as refused:
+        HullOptions(**{name: value})
+    assert str(refused.value) == f"hull_options.{name} must be {words}"
+
+
+def test_the_widest_blur_works() -> None:
+    assert extract_hull(fold(), UNIT, "density", HullOptions(blur=2.5)).volume > 0
 
 
 def test_shell_is_one_layer_with_outward_normals() -> None:

@@ -152,7 +152,7 @@ def test_its_parameters_are_the_options(unfolded: gu.Unfolding) -> None:
     assert repr(unfolder) == "Unfolder(reach=1.0)"
     with pytest.raises(OptionError, match="there is no option depth; valid: method, flattener"):
         unfolder.set_params(depth=3)
-    with pytest.raises(OptionError, match="unknown datum"):
+    with pytest.raises(OptionError, match="datum must be one of"):
         gu.Unfolder(datum="middle").fit(unfolded.folded)
     with pytest.raises(InputError, match="call fit first"):
         unfolder.transform(unfolded.folded)

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geounfold.cli.inputs.model_frame import three_numbers
 from geounfold.errors import InputError, OptionError
 from geounfold.io.paths import existing_file
 
@@ -27,10 +26,10 @@ def unfold_options(args: Namespace) -> UnfoldOptions:
     from geounfold.unfolding.options import UnfoldOptions
 
     readers: dict[str, Callable[[str], Any]] = {
-        "up": lambda text: three_numbers(text, "--up", "0,0,1"),
-        "body": _body,
-        "neighbours": lambda text: whole_number(text, "--neighbours"),
-        "reach": _reach,
+        "up": lambda text: tuple(_number(part) for part in text.split(",")),
+        "body": _number,
+        "neighbours": _number,
+        "reach": _number,
     }
     given = {n: getattr(args, n) for n in MODEL_OPTIONS if hasattr(args, n)}
     values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
@@ -77,16 +76,11 @@ def whole_number(text: str, option: str) -> int:
     return int(text)
 
 
-def _reach(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise OptionError(f"--reach needs a number of blocks such as 3, not '{text}'") from error
-
-
-def _body(text: str) -> int | str:
-    if text == "all":
-        return text
-    if not text.isdecimal():
-        raise OptionError(f"--body needs the number of a body, or all, not '{text}'")
-    return int(text)
+def _number(text: str) -> float | str:
+    """Return a whole number or a number, or the text for UnfoldOptions to refuse or take."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,16 @@ from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.thesis.joint import JointPlan, PlanField, barycentric, joint_plan
 from geounfold.methods.thesis.options import ThesisOptions
 from geounfold.methods.thesis.surfaces import CURE, two_sides, upright_frame
+
+GAP = 0.5  # working units: least vertical distance of top and bottom, which are moved apart to it
+PAD = 0.5  # working units: height of the mesh above and below the outermost blocks
+
+Flatten = Callable[[TriMesh, Floats | None], Flattening]
+"""``flatten(mesh, start)``: a surface laid flat from a start, (n, 2)."""
+
+
+def _by_springs(mesh: TriMesh, start: Floats | None) -> Flattening:
+    return flatten(mesh, start=start, repair=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +75,7 @@ def thesis_control(
     up: Floats | None = None,
     options: ThesisOptions | None = None,
     inset: float = 0.0,
+    flatten: Flatten = _by_springs,
 ) -> ThesisMesh:
     """Return the control mesh of the thesis (sections 3.2.2 to 3.2.4), and every part of it.
 
@@ -87,6 +99,9 @@ def thesis_control(
     inset : float
         How far the hull runs inside the blocks' outer faces (``Hull.inset``).  Only the
         stratigraphic coordinate uses it, so that 0 and 1 are the body's own faces.
+    flatten : callable
+        Lays a side flat from a start: ``flatten(mesh, start)``; by default by springs, as the
+        thesis.
 
     Returns
     -------
@@ -143,8 +158,8 @@ def thesis_control(
     P = _checked_points(points)
     turn = upright_frame(P, _checked_up(up), chosen.axis)
     blocks = P @ turn.T
-    top, bottom, steep = two_sides(hull.with_vertices(hull.V @ turn.T), chosen)
-    flat_top, flat_bottom = (_flat(side.mesh, chosen) for side in (top, bottom))
+    top, bottom, steep = two_sides(hull.with_vertices(hull.V @ turn.T), chosen.trim)
+    flat_top, flat_bottom = (_flat(side.mesh, flatten) for side in (top, bottom))
     flat_top = _moved(flat_top, flat_top.uv, top.mesh.V[:, :2])
     above = _field(top.mesh, flat_top)
     under, paired = above.at(bottom.mesh.V[:, :2])
@@ -153,10 +168,10 @@ def thesis_control(
         raise SplitError(f"the top does not lie over the bottom; {CURE}")
     flat_bottom = _moved(flat_bottom, flat_bottom.uv[paired], under[paired, 1:])
     below = _field(bottom.mesh, flat_bottom)
-    plan = joint_plan(blocks[:, :2], above, below, chosen.cell, chosen.merge)
-    prisms = _prisms(plan, above, below, chosen.least_gap)
+    plan = joint_plan(blocks[:, :2], above, below)
+    prisms = _prisms(plan, above, below)
     return ThesisMesh(
-        control=_control(plan, prisms, blocks, turn, thickness, inset, chosen.pad),
+        control=_control(plan, prisms, blocks, turn, thickness, inset),
         top=top.mesh.with_vertices(top.mesh.V @ turn),
         bottom=bottom.mesh.with_vertices(bottom.mesh.V @ turn),
         top_flat=flat_top,
@@ -203,11 +218,9 @@ def _checked_up(up: Floats | None) -> Floats | None:
     return vector
 
 
-def _flat(mesh: TriMesh, options: ThesisOptions) -> Flattening:
-    """Return one side laid flat, starting from its plan as Wang's springs do."""
-    start = mesh.V[:, :2] - mesh.V[:, :2].mean(axis=0)
-    how = options.flattener_options
-    return flatten(mesh, options.flattener, start=start, options=how, repair=False)
+def _flat(mesh: TriMesh, flatten: Flatten) -> Flattening:
+    """Return one side laid flat, from its plan as Wang's springs do."""
+    return flatten(mesh, mesh.V[:, :2] - mesh.V[:, :2].mean(axis=0))
 
 
 def _moved(flat: Flattening, source: Floats, target: Floats) -> Flattening:
@@ -224,17 +237,17 @@ def _field(mesh: TriMesh, flat: Flattening) -> PlanField:
     return PlanField(mesh, np.column_stack([mesh.V[:, 2], flat.uv]))
 
 
-def _prisms(plan: JointPlan, above: PlanField, below: PlanField, least_gap: float) -> _Prisms:
-    """Return both surfaces at the joint vertices, at least ``least_gap`` apart."""
+def _prisms(plan: JointPlan, above: PlanField, below: PlanField) -> _Prisms:
+    """Return both surfaces at the joint vertices, at least GAP apart."""
     (top, top_in), (bottom, bottom_in) = above.at(plan.xy), below.at(plan.xy)
-    lack = np.maximum(least_gap - (top[:, 0] - bottom[:, 0]), 0)
+    lack = np.maximum(GAP - (top[:, 0] - bottom[:, 0]), 0)
     top[:, 0] += lack / 2
     bottom[:, 0] -= lack / 2
     extended = int((~(top_in & bottom_in)).sum())
     return _Prisms(top, bottom, extended, int((lack > 0).sum()))
 
 
-def _pads(plan: JointPlan, prisms: _Prisms, blocks: Floats, pad: float) -> tuple[Floats, Floats]:
+def _pads(plan: JointPlan, prisms: _Prisms, blocks: Floats) -> tuple[Floats, Floats]:
     """Return how far the mesh reaches below the bottom and above the top at each vertex, (n,)."""
     corners = plan.F[plan.block_face]
     share = barycentric(plan.xy[corners], blocks[:, :2])
@@ -244,7 +257,7 @@ def _pads(plan: JointPlan, prisms: _Prisms, blocks: Floats, pad: float) -> tuple
         reach = np.zeros(len(plan.xy))
         # Repeated, not broadcast: numpy 2.4's maximum.at reads past the end of the latter.
         np.maximum.at(reach, corners.ravel(), np.repeat(outward * (blocks[:, 2] - level), 3))
-        out.append(reach + pad)
+        out.append(reach + PAD)
     return out[0], out[1]
 
 
@@ -255,12 +268,11 @@ def _control(
     turn: Floats,
     thickness: float,
     inset: float,
-    pad: float,
 ) -> ControlMesh:
     """Return the tetrahedra of the prisms and their pads in both spaces."""
     n = len(plan.xy)
     gap = prisms.top[:, 0] - prisms.bottom[:, 0]
-    under, over = _pads(plan, prisms, blocks, pad)
+    under, over = _pads(plan, prisms, blocks)
     folded, unfolded = [], []
     for share in (-under / gap, np.zeros(n), np.ones(n), 1 + over / gap):
         height, uv = prisms.at(share)

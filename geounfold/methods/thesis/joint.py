@@ -15,6 +15,8 @@ from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 
 ON_FACE = 1e-6  # distance in plan below which a point lies in the footprint, working units
 NEIGHBOURS = 24  # vertices that give the slope past the border
+CELL = 1.5  # working units: spacing of the border's vertices
+MERGE = 0.5  # working units: in plan, nearest that two surfaces' vertices may be
 
 
 class PlanField:
@@ -91,14 +93,12 @@ class JointPlan:
     block_face: Ints
 
 
-def joint_plan(
-    blocks: Floats, top: PlanField, bottom: PlanField, cell: float, merge: float
-) -> JointPlan:
+def joint_plan(blocks: Floats, top: PlanField, bottom: PlanField) -> JointPlan:
     """Return the Delaunay triangulation of both surfaces' vertices, and a border around it.
 
     Inserting the vertices of each surface into the other by Delaunay insertion, as Algorithm 1
     does, ends at the Delaunay triangulation of both, whatever the order.  A vertex within
-    ``merge`` of one that is there already is not inserted.  The border are the nodes of a grid
+    MERGE of one that is there already is not inserted.  The border are the nodes of a grid
     of cells under the blocks and one ring more, where not both surfaces are; triangles are kept
     where they hold a block or their centre lies in such a cell.
 
@@ -108,8 +108,6 @@ def joint_plan(
         Blocks in plan.
     top, bottom : PlanField
         The two surfaces.
-    cell, merge : float
-        Lengths in blocks.
 
     Raises
     ------
@@ -117,11 +115,11 @@ def joint_plan(
         A block lies in no triangle.
     """
     gap = cKDTree(top.xy).query(bottom.xy)[0]
-    inner = np.concatenate([top.xy, bottom.xy[gap > merge]])
-    low, mask = _cells(blocks, cell)
-    nodes = low + cell * np.argwhere(_corners(mask))
+    inner = np.concatenate([top.xy, bottom.xy[gap > MERGE]])
+    low, mask = _cells(blocks)
+    nodes = low + CELL * np.argwhere(_corners(mask))
     both = top.at(nodes)[1] & bottom.at(nodes)[1]
-    far = cKDTree(inner).query(nodes)[0] > 0.75 * cell
+    far = cKDTree(inner).query(nodes)[0] > 0.75 * CELL
     xy = np.concatenate([inner, nodes[far & ~both]])
     mesh = Delaunay(xy)
     F = mesh.simplices.astype(np.int64)
@@ -130,17 +128,17 @@ def joint_plan(
     held = mesh.find_simplex(blocks)
     if (held < 0).any():
         raise ControlMeshError(f"{(held < 0).sum()} blocks lie outside the joint triangulation")
-    at = np.floor((xy[F].mean(axis=1) - low) / cell).astype(np.int64)
+    at = np.floor((xy[F].mean(axis=1) - low) / CELL).astype(np.int64)
     at = np.clip(at, 0, np.array(mask.shape) - 1)
     keep = mask[at[:, 0], at[:, 1]] & (np.abs(area) > 1e-9)
     keep[held] = True
     return JointPlan(xy, F[keep], (np.cumsum(keep) - 1)[held])
 
 
-def _cells(blocks: Floats, cell: float) -> tuple[Floats, Bools]:
+def _cells(blocks: Floats) -> tuple[Floats, Bools]:
     """Return the grid's origin and the cells that hold blocks, dilated by one ring."""
-    low = blocks.min(axis=0) - 2.5 * cell
-    at = np.floor((blocks - low) / cell).astype(np.int64)
+    low = blocks.min(axis=0) - 2.5 * CELL
+    at = np.floor((blocks - low) / CELL).astype(np.int64)
     mask = np.zeros(at.max(axis=0) + 3, dtype=bool)
     mask[at[:, 0], at[:, 1]] = True
     wide: Bools = binary_dilation(mask, np.ones((3, 3), dtype=bool))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from geounfold.errors import OptionError
 from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair, level, mean_top_normal
 from geounfold.methods.thesis import thesis_control
@@ -17,10 +15,9 @@ def fit_thesis(body: PreparedBody) -> BodyFit:
             "--method thesis takes its surfaces from the hull; leave out --top and --bottom, "
             "or use --method sheet"
         )
-    chosen = replace(body.options, flattener=body.flattener)
     with body.stage("thesis"):
         up = mean_top_normal(body.split)
-        mesh = thesis_control(body.points, hull.mesh, up, chosen, hull.inset)
+        mesh = thesis_control(body.points, hull.mesh, up, body.options, hull.inset, body.flatten)
     sides = {"top": (mesh.top, mesh.top_flat, 0.5), "bottom": (mesh.bottom, mesh.bottom_flat, -0.5)}
     surfaces = {
         name: SurfacePair(folded, level(folded, flat.uv, share * mesh.thickness), flat)

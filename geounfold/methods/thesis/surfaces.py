@@ -12,10 +12,14 @@ from geounfold.backends.igl import SurfaceIndex, boundary_loops, face_components
 from geounfold.errors import NoSheetError, SplitError
 from geounfold.geometry.measures import lengths, triangle_areas
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
-from geounfold.methods.thesis.options import ThesisOptions
 from geounfold.surfaces.split import split
 
 LIFT = 1e-6  # start of a ray above its face, working units
+HIDDEN = 0.05  # largest share of a side that may lie behind itself
+TORN = 0.1  # largest share of a side that steep slopes may tear off
+STEEP = 0.1
+"""Largest share of the hull away from its rim that the filter may miss or take for the other side:
+at most 0.08 on the bodies that the method could hold, 0.18 on the next."""
 LIMITATION = "the thesis's method pairs top and bottom vertically and cannot hold an overhang"
 CURE = "use --method sheet"
 
@@ -69,7 +73,7 @@ def upright_frame(points: Floats, up: Floats | None, axis: str) -> Floats:
     return axes
 
 
-def two_sides(hull: TriMesh, options: ThesisOptions) -> tuple[Side, Side, float]:
+def two_sides(hull: TriMesh, trim: int) -> tuple[Side, Side, float]:
     """Return top and bottom of a closed, outward hull whose third coordinate is vertical.
 
     The third answer is the share of the hull away from its rim that the filter missed or took
@@ -83,12 +87,12 @@ def two_sides(hull: TriMesh, options: ThesisOptions) -> tuple[Side, Side, float]
         The body has no two opposite surfaces.
     """
     side, steep = _filter(hull)
-    if steep > options.max_steep:
+    if steep > STEEP:
         raise SplitError(
             f"{steep:.0%} of the surface is too steep or overturned: {LIMITATION}; {CURE}"
         )
-    top = _one_side(hull, side == 1, 1.0, options)
-    return top, _one_side(hull, side == -1, -1.0, options), steep
+    top = _one_side(hull, side == 1, 1.0, trim)
+    return top, _one_side(hull, side == -1, -1.0, trim), steep
 
 
 def _filter(hull: TriMesh) -> tuple[Ints, float]:
@@ -106,23 +110,23 @@ def _filter(hull: TriMesh) -> tuple[Ints, float]:
     return side, float(area[side != true.side].sum() / area.sum())
 
 
-def _one_side(hull: TriMesh, faces: Bools, outward: float, options: ThesisOptions) -> Side:
+def _one_side(hull: TriMesh, faces: Bools, outward: float, trim: int) -> Side:
     """Return the part of the chosen faces that is seen from ``outward`` (+1 above, -1 below)."""
     name = "top" if outward > 0 else "bottom"
     mesh, _ = hull.submesh(faces)
     behind = _hidden(mesh, outward)
     plan = outward * triangle_areas(mesh.V[:, :2], mesh.F)
     hidden = float(plan[behind].sum() / plan.sum())
-    if hidden > options.max_hidden:
+    if hidden > HIDDEN:
         raise SplitError(
             f"{hidden:.0%} of the {name} lies behind another part of it: {LIMITATION}; {CURE}"
         )
     mesh, pieces = _largest_piece(TriMesh(mesh.V, mesh.F[~behind]))
     height = _mean_height(mesh)
-    for _ in range(options.trim):
+    for _ in range(trim):
         mesh, torn = _largest_piece(_without_border(mesh, name))
         pieces = 1 - (1 - pieces) * (1 - torn)
-    if pieces > options.max_pieces:
+    if pieces > TORN:
         raise SplitError(f"steep slopes tear {pieces:.0%} of the {name} off: {LIMITATION}; {CURE}")
     F = mesh.F if outward > 0 else mesh.F[:, ::-1]
     return Side(TriMesh(mesh.V, F), height, hidden, pieces)

@@ -10,10 +10,10 @@ import numpy as np
 
 from geounfold.backends import igl as _igl
 from geounfold.body.scattered import scattered
-from geounfold.errors import BackendError, HullError, OptionError
+from geounfold.errors import BackendError, HullError, check_one_of
 from geounfold.geometry.measures import face_normals, triangle_areas
 from geounfold.geometry.mesh import Floats
-from geounfold.surfaces.hull._finish import HullOptions
+from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import Hull
 from geounfold.surfaces.hull.alpha import alpha_hull
 from geounfold.surfaces.hull.ball_pivoting import ball_pivoting_hull
@@ -68,6 +68,7 @@ def extract_hull(
     HullError
         The method made no closed manifold hull; the message names another one.
     """
+    check_one_of("hull", method, ("auto", *HULLS))
     points = np.asarray(points, dtype=np.float64)
     options = options or HullOptions()
     sides = np.ones(3) if steps is None or steps.max() <= UNEQUAL * steps.min() else steps
@@ -78,8 +79,6 @@ def extract_hull(
         makers = HULLS | {"density": scattered_hull}
     if method == "auto":
         return _first_suitable(makers, points, sides, options)
-    if method not in HULLS:
-        raise OptionError(f"unknown hull '{method}'; valid: auto, {', '.join(HULLS)}")
     return makers[method](points, sides, options)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -16,39 +16,13 @@ from geounfold.geometry.measures import enclosed_volume
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 from geounfold.surfaces.hull._result import Hull
 
+#: Sweeps of isotropic remeshing.  With 1 and with 4 the rms of five bodies changes by at most 0.01
+#: blocks; of two more it grows by 0.2 to 0.8 with either.
+REMESHING = 2
 
-@dataclass(frozen=True, kw_only=True)
-class HullOptions:
-    """How hulls are made; lengths in working units (1 = one block).
-
-    Attributes
-    ----------
-    edge : float
-        Edge length of the hull.
-    remesh_iterations : int
-        Sweeps of isotropic remeshing.
-    sigma : float
-        Standard deviation of the density's blur, block sides.
-    sigma_thin : float
-        That of sheets one or two blocks thick, in the longest block side.
-    level : float
-        Share of the inner density on the density hull.
-    shell : float
-        Points whose density share is below this make up the shell.
-    smoothing : int
-        Taubin steps that take the block steps out of a hull through the outermost centroids.
-    alpha : float or None
-        Radius of the alpha shape; None to find the smallest that encloses the points.
-    """
-
-    edge: float = 1.5
-    remesh_iterations: int = 2
-    sigma: float = 0.8
-    sigma_thin: float = 1.0
-    level: float = 0.5
-    shell: float = 0.9
-    smoothing: int = 10
-    alpha: float | None = None
+#: Taubin steps that take the stairs of blocks out of a hull.  With 5 and with 20 the rms of a body
+#: of flat blocks grows by 0.001 and 0.005 blocks.
+SMOOTHING = 10
 
 
 def finish(
@@ -57,11 +31,9 @@ def finish(
     *,
     method: str,
     blocks: float,
-    inset: float,
-    blur: float,
-    options: HullOptions,
+    edge: float,
     project: Callable[[Floats], Floats] | None = None,
-    smoothing: int = 0,
+    smooth: bool = False,
 ) -> Hull:
     """Return the hull made of the largest component of raw, closed triangles.
 
@@ -70,17 +42,22 @@ def finish(
     V : (n, 3) float
         Vertices, working units.
     F : (m, 3) int
-        Faces of a closed manifold surface, any orientation that is coherent.
-    method, inset, blur
-        As in Hull.
-    blocks : int
-        The blocks' volume in working units: their number.
-    options : HullOptions
-        Edge length and remeshing.
+        Faces of a closed manifold surface, in a coherent orientation, outward or inward.
+    method : str
+        The method that made them.
+    blocks : float
+        Volume of the blocks, working units: their number.
+    edge : float
+        Edge length of the hull, working units.
     project : callable, optional
         Moves points (n, 3) near the surface on to it; applied after remeshing.
-    smoothing : int
-        Taubin steps before remeshing.
+    smooth : bool
+        Whether the stairs of blocks are smoothed before remeshing.
+
+    Returns
+    -------
+    Hull
+        With an inset and a blur of zero.
 
     Raises
     ------
@@ -92,9 +69,9 @@ def finish(
     check_closed_manifold(F, method)
     if enclosed_volume(V, F) < 0:
         F = F[:, ::-1]
-    if smoothing:
-        V = meshlab.taubin(V, F, smoothing)
-    V, F = meshlab.remesh(V, F, options.edge, options.remesh_iterations)
+    if smooth:
+        V = meshlab.taubin(V, F, SMOOTHING)
+    V, F = meshlab.remesh(V, F, edge, REMESHING)
     if project is not None:
         V = project(V)
     check_closed_manifold(F, method)
@@ -106,15 +83,15 @@ def finish(
         method=method,
         volume=volume,
         blocks_volume=float(blocks),
-        inset=inset,
-        blur=blur,
+        inset=0.0,
+        blur=0.0,
         dropped=int((~keep).sum()),
     )
 
 
-def smoothed(hull: Hull, steps: int) -> Hull:
+def smoothed(hull: Hull) -> Hull:
     """Return a hull whose vertices are smoothed by Taubin's steps, which keep the volume."""
-    V = meshlab.taubin(hull.mesh.V, hull.mesh.F, steps)
+    V = meshlab.taubin(hull.mesh.V, hull.mesh.F, SMOOTHING)
     return replace(hull, mesh=hull.mesh.with_vertices(V), volume=enclosed_volume(V, hull.mesh.F))
 
 
@@ -134,10 +111,10 @@ def compact(V: Floats, F: Ints) -> tuple[Floats, Ints]:
 
 
 def check_closed_manifold(F: Ints, method: str) -> None:
-    """Raise HullError unless the faces bound a solid, coherently oriented.
+    """Raise HullError unless the faces bound a solid and are oriented coherently.
 
-    That is: each directed edge occurs once, and so does its reverse; and the faces around each
-    vertex form one fan.
+    Each directed edge and its reverse then occur once, and the faces around each vertex form one
+    fan.
     """
     if len(F) < 4:
         raise HullError(f"the {method} hull has no faces; {_advice(method)}")

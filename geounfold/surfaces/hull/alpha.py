@@ -17,9 +17,9 @@ from scipy.spatial import Delaunay, QhullError
 
 from geounfold.errors import HullError
 from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.surfaces.hull._finish import HullOptions, finish
+from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import Hull
-from geounfold.surfaces.hull.outermost_points import outer_shell
+from geounfold.surfaces.hull.outermost_points import hull_through
 
 MARGIN = 1.05  # the smallest alpha is widened by this, past lengths that a lattice repeats
 LARGEST = 20.0  # block sides: an alpha beyond this bridges any gap worth the name
@@ -46,31 +46,15 @@ class _Complex:
 def alpha_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     """Return the hull through the outermost centroids, by an alpha shape.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Centroids, working units.
-    sides : (3,) float
-        Block sides along the axes, working units; alpha is measured in ``points / sides``.
-    options : HullOptions
-        ``alpha``, ``shell``, ``sigma``, ``smoothing`` and the remeshing are used.
+    ``options.alpha`` is measured in ``points / sides``.
 
     Raises
     ------
     HullError
         No alpha holds the points, or the result cannot be mended.
     """
-    shell = outer_shell(points / sides, options.sigma, options.shell)
-    V, F, _ = alpha_solid(shell.points, options.alpha)
-    return finish(
-        V * sides,
-        F,
-        method="alpha",
-        blocks=len(points),
-        inset=0.5,
-        blur=0.0,
-        options=options,
-        smoothing=options.smoothing,
+    return hull_through(
+        points, sides, options, "alpha", lambda s: alpha_solid(s.points, options.alpha)[:2]
     )
 
 

@@ -7,13 +7,14 @@ import numpy as np
 from geounfold.backends import meshlab
 from geounfold.backends.igl import boundary_loops
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.surfaces.hull._finish import HullOptions, compact, finish, largest_component
+from geounfold.surfaces.hull._finish import compact, largest_component
+from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import Hull
 from geounfold.surfaces.hull.density import tie_break
-from geounfold.surfaces.hull.outermost_points import outer_shell
+from geounfold.surfaces.hull.outermost_points import hull_through
 
-# Block sides: none passes a gap of a lattice's surface, whose holes are 0.87 wide.  Which one
-# closes it depends on ties among cospherical points; they are tried in this order.
+# Block sides, tried in this order: none passes a gap of a lattice's surface, whose holes are 0.87
+# wide.  Ties among cospherical points decide which one closes it.
 RADII = (1.2, 1.35, 1.05, 1.5)
 LONGEST_HOLE = 400  # edges of the longest border that is closed
 
@@ -21,31 +22,17 @@ LONGEST_HOLE = 400  # edges of the longest border that is closed
 def ball_pivoting_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     """Return the hull through the outermost centroids, by ball pivoting.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Centroids, working units.
-    sides : (3,) float
-        Block sides along the axes, working units; the surface is made in ``points / sides``.
-    options : HullOptions
-        ``shell``, ``sigma``, ``smoothing`` and the remeshing are used.
-
     Raises
     ------
     HullError
         The surface is not closed or not manifold after its holes were closed.
     """
-    shell = outer_shell(points / sides, options.sigma, options.shell)
-    V, F = ball_pivoting_surface(shell.points, shell.normals)
-    return finish(
-        V * sides,
-        F,
-        method="ball_pivoting",
-        blocks=len(points),
-        inset=0.5,
-        blur=0.0,
-        options=options,
-        smoothing=options.smoothing,
+    return hull_through(
+        points,
+        sides,
+        options,
+        "ball_pivoting",
+        lambda s: ball_pivoting_surface(s.points, s.normals),
     )
 
 

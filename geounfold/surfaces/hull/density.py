@@ -31,7 +31,8 @@ from geounfold.backends import igl as _igl
 from geounfold.body.scattered import local_spacing
 from geounfold.geometry.measures import unit
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.surfaces.hull._finish import HullOptions, finish, smoothed
+from geounfold.surfaces.hull._finish import finish, smoothed
+from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import UNEQUAL, Hull
 
 BRICK = 16  # grid nodes per brick and axis, at half a block
@@ -44,6 +45,8 @@ THIN = (0.3, 0.7)
 
 Measured: 0.48 to 0.59 for one block, 0.71 to 0.78 for two; below, the lattice is mostly empty.
 """
+THIN_BLUR = 1.0
+"""Standard deviation of the blur of a thin sheet, in the longest block side."""
 LOOSE = 1.25  # standard deviation of the blur of scattered points, in their spacing
 _CLIP = 1e-4  # the quantile function is clipped to this share of the density
 _CORNERS = np.array(
@@ -177,7 +180,7 @@ def density_hull(
         Block sides along the axes, working units; density and blur are isotropic in
         ``points / sides``.
     options : HullOptions
-        ``sigma``, ``level`` and the remeshing are used.
+        ``blur``, ``level`` and ``edge`` are used.
     weights : (n,) float, optional
         Volume of each block, 1 by default.
 
@@ -186,21 +189,21 @@ def density_hull(
     HullError
         The points are too sparse for any part of the grid to reach the level.
     """
-    field = density_field(points / sides, options.sigma, weights)
+    field = density_field(points / sides, options.blur, weights)
     thin = THIN[0] < field.filling < THIN[1]
     flat = sides.max() > UNEQUAL * sides.min()
     blur, inset = field.blur, 0.0
     if thin:
         solid = float(sides.max() ** 3 / sides.prod())
         sides = np.full(3, sides.max())  # flat blocks in a thin sheet may not even touch
-        field = density_field(points / sides, options.sigma_thin, weights)
+        field = density_field(points / sides, THIN_BLUR, weights)
         inset = field.inset(options.level, solid) * float(sides[0])
         blur = field.blur * float(sides[0])
     volume = len(points) if weights is None else float(weights.sum())
     hull = _finished(field, sides, volume, blur, options, inset=inset, fine=thin)
     # Flat blocks climb a slope in stairs wider than the blur: unsmoothed, they pass for rims
     # (rms 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
-    return smoothed(hull, options.smoothing) if flat else hull
+    return smoothed(hull) if flat else hull
 
 
 def scattered_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
@@ -209,9 +212,9 @@ def scattered_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     At random points the density is uneven: it is blurred more, and what it would enclose
     with nothing blurred counts as the blocks' volume.
     """
-    coarse = LOOSE / options.sigma
+    coarse = LOOSE / options.blur
     weights = local_spacing(points) ** 3
-    field = density_field(points / coarse, options.sigma, weights)
+    field = density_field(points / coarse, options.blur, weights)
     volume = float(weights.sum()) / field.inner * (NODE * coarse) ** 3
     return _finished(field, np.full(3, coarse), volume, field.blur * coarse, options)
 
@@ -233,12 +236,10 @@ def _finished(
         F,
         method="density",
         blocks=volume,
-        inset=inset,
-        blur=blur,
-        options=options,
+        edge=options.edge,
         project=lambda x: field.project(x / sides, options.level) * sides,
     )
-    return replace(hull, even=fine)
+    return replace(hull, inset=inset, blur=blur, even=fine)
 
 
 def density_field(

@@ -1,14 +1,22 @@
-"""The outermost points of a body, with outward normals: input of the surface reconstructions."""
+"""The outermost points of a body, with outward normals, and hulls made through them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geounfold.errors import HullError
 from geounfold.geometry.mesh import Floats, Ints
+from geounfold.surfaces.hull._finish import finish
+from geounfold.surfaces.hull._options import HullOptions
+from geounfold.surfaces.hull._result import Hull
 from geounfold.surfaces.hull.density import density_field, tie_break
+
+#: Share of the inner density below which a point is outermost: it is 0.75 at the centroids of an
+#: outermost plane layer and 0.98 in the next, so this takes one layer.
+OUTER = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,27 +39,58 @@ class Shell:
     index: Ints
 
 
-def outer_shell(points: Floats, sigma: float, below: float) -> Shell:
-    """Return the points where the blurred density falls below a share of its inner value.
+def outer_shell(points: Floats, blur: float, below: float = OUTER) -> Shell:
+    """Return the points at which the blurred density is below a share of its inner value.
 
     Parameters
     ----------
     points : (n, 3) float
         Centroids in block sides: the spacing is about one along each axis.
-    sigma : float
+    blur : float
         Standard deviation of the density's blur.
     below : float
-        Share of the inner density: 0.75 at the centroids of an outermost plane layer and 0.98
-        in the next, so 0.9 takes one layer.
+        Share of the inner density.
 
     Raises
     ------
     HullError
         Fewer than four points lie on the outside.
     """
-    field = density_field(points, sigma)
+    field = density_field(points, blur)
     index = np.flatnonzero(field.share < below)
     if len(index) < 4:
         raise HullError("the body has no outer points to wrap; try hull 'density'")
     outer = points[index]
     return Shell(outer + tie_break(outer), field.outward(outer), index)
+
+
+def hull_through(
+    points: Floats,
+    sides: Floats,
+    options: HullOptions,
+    method: str,
+    surface: Callable[[Shell], tuple[Floats, Ints]],
+) -> Hull:
+    """Return the hull that a method makes through the outermost centroids.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Centroids, working units.
+    sides : (3,) float
+        Block sides along the axes, working units; the surface is made in ``points / sides``.
+    options : HullOptions
+        ``blur`` finds the outermost points, ``edge`` is the hull's.
+    method : str
+        Its name in HULLS.
+    surface : callable
+        ``surface(shell) -> (V, F)``: the triangles, in block sides.
+
+    Raises
+    ------
+    HullError
+        The body has no outermost points, or the surface is not closed or not manifold.
+    """
+    V, F = surface(outer_shell(points / sides, options.blur))
+    hull = finish(V * sides, F, method=method, blocks=len(points), edge=options.edge, smooth=True)
+    return replace(hull, inset=0.5)

@@ -6,9 +6,9 @@ import numpy as np
 
 from geounfold.backends import meshlab
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.surfaces.hull._finish import HullOptions, finish
+from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import Hull
-from geounfold.surfaces.hull.outermost_points import outer_shell
+from geounfold.surfaces.hull.outermost_points import hull_through
 
 CELL = 1.0  # block sides: side of the octree's smallest cell
 DEEPEST = 10
@@ -17,31 +17,13 @@ DEEPEST = 10
 def poisson_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     """Return the hull through the outermost centroids, by Poisson reconstruction.
 
-    Parameters
-    ----------
-    points : (n, 3) float
-        Centroids, working units.
-    sides : (3,) float
-        Block sides along the axes, working units; the surface is made in ``points / sides``.
-    options : HullOptions
-        ``shell``, ``sigma``, ``smoothing`` and the remeshing are used.
-
     Raises
     ------
     HullError
         The surface is not closed (the normals are unreliable) or not manifold.
     """
-    shell = outer_shell(points / sides, options.sigma, options.shell)
-    V, F = poisson_surface(shell.points, shell.normals)
-    return finish(
-        V * sides,
-        F,
-        method="poisson",
-        blocks=len(points),
-        inset=0.5,
-        blur=0.0,
-        options=options,
-        smoothing=options.smoothing,
+    return hull_through(
+        points, sides, options, "poisson", lambda s: poisson_surface(s.points, s.normals)
     )
 
 

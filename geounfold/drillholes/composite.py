@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from geounfold.errors import OptionError
+from geounfold.errors import OptionError, check_number, check_one_of
 from geounfold.geometry.mesh import Floats, Ints
 
 Residual = Literal["merge", "drop", "keep"]
@@ -24,14 +24,14 @@ class CompositeOptions:
     Parameters
     ----------
     length : float
-        Length along the hole, in the tables' unit. Composites begin at the collar, at whole
-        multiples of it, so that they do not depend on where sampling began.
+        Length along the hole, in the tables' unit. Composites begin at its whole multiples from
+        the collar, so they do not depend on the depth at which sampling began.
     residual : {"merge", "drop", "keep"}
-        What becomes of the last one, cut at the hole's last interval, where it is shorter than
-        half the length: part of the one above (default; no metal is lost), left out, or kept.
+        What becomes of the last composite of a hole if it is shorter than half the length:
+        joined to the one above (no metal is lost), left out, or kept.
     min_coverage : float
-        Share of a composite's length, 0 to 1, that must be assayed for a grade; elsewhere the
-        grade is missing (default 0.5). A composite without any grade is left out.
+        Share of a composite's length that must be assayed; below it the grade is missing. A
+        composite without any grade is left out.
 
     Raises
     ------
@@ -44,12 +44,9 @@ class CompositeOptions:
     min_coverage: float = 0.5
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.length) and self.length > 0):
-            raise OptionError(f"the composite length must be above 0, not {self.length}")
-        if self.residual not in RESIDUALS:
-            raise OptionError(f"residual must be {', '.join(RESIDUALS)}, not '{self.residual}'")
-        if not 0 <= self.min_coverage <= 1:
-            raise OptionError(f"min_coverage must be 0 to 1, not {self.min_coverage}")
+        check_number("length", self.length, 0, low_open=True)
+        check_one_of("residual", self.residual, RESIDUALS)
+        check_number("min_coverage", self.min_coverage, 0, 1)
 
 
 @dataclass(frozen=True, eq=False)

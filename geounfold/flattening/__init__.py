@@ -63,10 +63,10 @@ class Flattener:
     options : type
         Its options, a frozen dataclass that checks itself.
     keeps : str
-        What it keeps where the surface allows that, and nearly keeps elsewhere: ``lengths``,
+        What it keeps if the surface allows that, and else nearly keeps: ``lengths``,
         ``angles``, or ``nothing`` but neighbourhood.
     free : bool
-        Whether all it calls is free software; what is not runs only where it is named.
+        Whether all that it calls is free software; a flattener that is not runs only by its name.
     """
 
     name: str
@@ -114,7 +114,7 @@ def flatten(
     method : str
         A name in FLATTENERS.
     start : (n, 2) array, optional
-        Flat positions to start from, mirrored back where they are mirrored; by default the
+        Flat positions to start from, mirrored back if they are mirrored; by default the
         method's own, Tutte's embedding for most.
     rest : (k,) array, optional
         Length that each edge of ``geometry.unique_edges(F)`` should have when flat, in the
@@ -123,7 +123,7 @@ def flatten(
         The method's options; by default its defaults.
     repair : bool
         Whether an answer with triangles folded over or a border that overlaps itself is
-        repaired, or is an error where that fails.  False returns it as it is, its ``flips`` and
+        repaired, or is an error if that fails.  False returns it as it is, its ``flips`` and
         ``overlaps`` counted.
 
     Returns
@@ -132,7 +132,7 @@ def flatten(
         Flat positions in the mesh's unit and vertex order, centred at zero, never mirrored.
         With ``repair`` the map is proved to be one-to-one: every triangle counter-clockwise and
         no two border edges meeting, by exact predicates, suffice (Lipman 2014, arXiv
-        1310.0955).  ``note`` says what had to be done: the vertices about a few folded
+        1310.0955).  ``note`` names what was done: the vertices about a few folded
         triangles moved (Garanzha et al. 2021, arXiv 2102.03069); or, for methods that keep
         lengths, libigl's SLIM from Tutte's embedding instead.
 

@@ -33,10 +33,10 @@ class Border:
     Attributes
     ----------
     crossings : (q, 2, 2) int
-        Pairs of border edges whose images meet where the edges do not, each edge as its two
+        Pairs of border edges with images that meet though the edges do not, each edge as its two
         vertices.
     turned : int
-        Loops too many that run counter-clockwise, or 1 where none does; counted only where
+        Loops too many that run counter-clockwise, or 1 if none does; counted only if
         nothing crosses.
     """
 
@@ -45,7 +45,7 @@ class Border:
 
     @property
     def overlaps(self) -> int:
-        """Return the crossings, and where there are none the loops that run the wrong way."""
+        """Return the crossings, or if there are none the loops that run the wrong way."""
         return len(self.crossings) + self.turned
 
 
@@ -110,7 +110,7 @@ def _near_pairs(segments: Floats) -> Ints:
 def _meet(uv: Floats, first: Ints, second: Ints) -> Bools:
     """Return whether edges whose boxes touch have images with a common point, (p,).
 
-    Edges with a common vertex count where they have another point in common.
+    Edges with a common vertex count if they have another point in common.
     """
     apart = ~(first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
     out = np.zeros(len(first), dtype=bool)
@@ -134,7 +134,7 @@ def _fold_back(uv: Floats, first: Ints, second: Ints) -> Bools:
 
 
 def _turn(points: Floats) -> int:
-    """Return 1 where a simple polygon (b, 2) runs counter-clockwise, -1 where clockwise."""
+    """Return 1 if a simple polygon (b, 2) runs counter-clockwise, -1 if clockwise."""
     k = int(np.lexsort((points[:, 1], points[:, 0]))[0])
     around = points[[k - 1, k, (k + 1) % len(points)]]
     return int(orientations(around[:1], around[1:2], around[2:])[0])

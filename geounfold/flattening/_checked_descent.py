@@ -49,7 +49,7 @@ def descend(
     uv : (n, 2) float
         The start: sound.
     step : callable
-        Returns the next positions, (n, 2); BackendError where it fails.
+        Returns the next positions, (n, 2); BackendError if it fails.
     options : IterationOptions
         When to stop.
     sound : callable

@@ -32,7 +32,7 @@ def to_landmarks(field: Callable[[int], Floats], V: Floats, most: int) -> tuple[
     V : (n, 3) float
         Vertices.
     most : int
-        Number of landmarks; all vertices where there are no more.
+        Number of landmarks; all vertices if there are no more.
     """
     if len(V) <= most:
         chosen = np.arange(len(V))
@@ -50,7 +50,7 @@ def to_landmarks(field: Callable[[int], Floats], V: Floats, most: int) -> tuple[
 
 
 def by_distances(problem: Problem, chosen: Ints, D: Floats, method: str, kind: str) -> Flattening:
-    """Return the flattening whose distances from the landmarks are nearest to those given.
+    """Return the flattening with distances from the landmarks nearest to those given.
 
     Parameters
     ----------

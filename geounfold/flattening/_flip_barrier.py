@@ -17,8 +17,8 @@ SHARE = 0.9
 class FoldGuard:
     """The barrier ``B = C sum A psi(A'/A)``, ``psi(r) = -(r - REACH)^2 ln(r / REACH)``.
 
-    It is zero, with two continuous derivatives, where a triangle keeps more than ``REACH`` of
-    its rest area, and infinite where a triangle has none left (Li et al. 2020 use this function
+    It is zero, with two continuous derivatives, if a triangle keeps more than ``REACH`` of
+    its rest area, and infinite if a triangle has none left (Li et al. 2020 use this function
     against contact).  Wang et al. (2002) penalise overlaps likewise, by extra springs.
 
     Parameters
@@ -33,7 +33,7 @@ class FoldGuard:
         self._F, self._areas = F, areas
 
     def energy(self, uv: Floats) -> float:
-        """Return B; infinite where a triangle is folded over."""
+        """Return B; infinite if a triangle is folded over."""
         ratio = triangle_areas(uv, self._F) / self._areas
         if not (ratio > 0).all():
             return float("inf")

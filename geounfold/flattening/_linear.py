@@ -88,7 +88,7 @@ def preconditioned_solve(
     -------
     (n,) float or None
         The solution with a residual of at most ``tol`` of the load's, measured in the
-        preconditioner; None where that takes more than ``max_iter`` steps, or where the matrix
+        preconditioner; None if that takes more than ``max_iter`` steps, or if the matrix
         or the preconditioner turns out not to be positive definite.
     """
     x, residual = np.zeros_like(load), load.copy()

@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 #: triangle inequality on a needle, which then is laid out with this height.
 THINNEST = 1e-9
 
-#: A map has collapsed where its median edge is shorter than this share of its rest length.
+#: A map has collapsed if its median edge is shorter than this share of its rest length.
 COLLAPSED = 1e-3
 
 

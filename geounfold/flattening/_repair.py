@@ -28,11 +28,11 @@ def one_to_one(problem: Problem, flat: Flattening, isometric: bool) -> Flattenin
     1. *Untangling*: the vertices about a few turned triangles are moved, all others stay.
     2. *SLIM* from Tutte's embedding, for isometric methods and the mesh's own lengths alone;
        nothing flips.
-    3. The last one-to-one step of 2, where its border came to overlap.  Scaffold maps would go
+    3. The last one-to-one step of 2, if its border came to overlap.  Scaffold maps would go
        on from there, but their mesh around the surface is Triangle's, which is not free
        software: ``scaf`` is there for those who may use it.
 
-    The answer keeps its method's name; its note says what was done.
+    The answer keeps its method's name; its note names what was done.
 
     Parameters
     ----------

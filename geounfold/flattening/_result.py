@@ -41,7 +41,7 @@ class Flattening:
         Steps taken; 0 for a direct solve.
     energy, area_error, edge_error : (k,) float
         One value per recorded step: the method's energy, the relative area difference E_s
-        (Wang 2002) and the root mean square edge strain.  Where a fall-back gave the answer,
+        (Wang 2002) and the root mean square edge strain.  If a fall-back gave the answer,
         they and ``stop`` are the fall-back's.
     flips : int
         Triangles whose flat area is not positive, by an exact predicate.
@@ -65,14 +65,14 @@ class Flattening:
 
     @cached_property
     def border(self) -> Border:
-        """Return what the flat border shows; worked out when first asked for."""
+        """Return where the flat border meets itself; computed once."""
         return border_of(self.uv, self.loops)
 
     @property
     def overlaps(self) -> int:
         """Return the number of pairs of border edges whose flat images meet, by exact tests.
 
-        Where there are none, the border loops that run the wrong way round (a hole turned inside
+        If there are none, the border loops that run the wrong way round (a hole turned inside
         out) are counted instead.
         """
         return self.border.overlaps
@@ -82,6 +82,6 @@ class Flattening:
         """Return whether the flat map is proved to be one-to-one: no flips and no overlaps.
 
         An orientation-preserving map, linear on triangles, of a disk (holes allowed) is
-        one-to-one where its border is (Lipman, arXiv 1310.0955); ``_border`` says why.
+        one-to-one if its border is (Lipman, arXiv 1310.0955; proof in ``_border``).
         """
         return self.flips == 0 and self.overlaps == 0

@@ -36,7 +36,7 @@ def spring_forces(uv: Floats, edges: Ints, rest: Floats) -> Floats:
 def spring_blocks(uv: Floats, edges: Ints, rest: Floats, convex: bool) -> Floats:
     """Return the second derivative of each spring, (k, 2, 2), for C = 1.
 
-    ``e e' + (1 - d/l)(I - e e')``; a shortened spring's negative part is left out where
+    ``e e' + (1 - d/l)(I - e e')``; a shortened spring's negative part is left out if
     ``convex`` is set.
     """
     e, length = _directions(uv, edges)

@@ -12,7 +12,7 @@ from geounfold.flattening._problem import Problem, upright
 from geounfold.geometry.measures import lengths, triangle_areas, unique_edges
 from geounfold.geometry.mesh import Floats, Ints, TriMesh
 
-#: A triangle is degenerate where its area is below this share of its longest side squared.
+#: A triangle is degenerate if its area is below this share of its longest side squared.
 DEGENERATE = 1e-12
 
 NOT_MANIFOLD = (

@@ -7,7 +7,7 @@ Garanzha et al. 2021 (arXiv 2102.03069): the energy
 
 is finite for turned triangles and rises without bound with -d as e falls; J is the map's
 derivative on the triangle.  It is brought down by L-BFGS while e follows the worst determinant,
-``e^2 = 1e-12 + 0.04 min(0, det)^2``.  Where nothing is turned, its minimum is an isometry.
+``e^2 = 1e-12 + 0.04 min(0, det)^2``.  If nothing is turned, its minimum is an isometry.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Untangled:
 
 
 def untangle(problem: Problem, uv: Floats) -> Untangled | None:
-    """Return the flat positions with no triangle turned over, or None where that fails.
+    """Return the flat positions with no triangle turned over, or None if that fails.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class _Energy:
         a, b = self._columns(uv)
         det = (np.conj(a) * b).imag
         root = np.hypot(floor, det)
-        # Without cancellation where the determinant is negative.
+        # Without cancellation if the determinant is negative.
         chi = np.where(det > 0, (det + root) / 2, floor * floor / (2 * (root - np.minimum(det, 0))))
         top = (a * np.conj(a)).real + (b * np.conj(b)).real + det * det + 1
         by_det = (2 * det - top / root) / chi

@@ -38,7 +38,7 @@ def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flatte
     start : (n, 2) float or None
         Flat positions to start from; None takes Tutte's embedding.
     options : ArapOptions
-        See there.
+        When to stop.
     """
     uv = tutte(problem) if start is None else start
     # A common size for every unit: libigl's solver has absolute thresholds.

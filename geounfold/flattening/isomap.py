@@ -30,8 +30,8 @@ class IsomapOptions:
     neighbours : int
         Nearest vertices in space that each vertex is joined to, and others as near as the last.
     landmarks : int
-        Vertices from which paths are measured, spread as far apart as can be; all vertices
-        where there are no more than that.
+        Vertices from which paths are measured, spread as far apart as possible; all vertices if
+        there are no more.
     """
 
     neighbours: int = 16
@@ -46,13 +46,13 @@ def isomap(problem: Problem, start: Floats | None, options: IsomapOptions) -> Fl
     """Flatten by landmark Isomap (Tenenbaum et al. 2000; de Silva and Tenenbaum 2004).
 
     Vertices are joined to their nearest ones in space (16, as in Unfolding.jl), distances are
-    the shortest paths through this graph, and classical scaling follows (``_landmarks`` says
-    how).  The surface's own edges are joined too, so that the graph is always in one piece.
+    the shortest paths through this graph, and classical scaling follows
+    (``_classical_scaling``).  The surface's own edges are joined too, so that the graph is always
+    in one piece.
 
-    It errs in two ways that ``mds`` does not: paths zigzag, by some per cent; and where limbs
-    are nearer to each other than a few edges, paths cut through between them, and the map
-    folds.  Nothing bars that.  Like ``mds`` it needs a convex flat image.  A direct solve, so a
-    start changes nothing.
+    It errs in two ways that ``mds`` does not: paths zigzag, by some per cent; and if limbs are
+    nearer to each other than a few edges, paths cut through between them and the map folds.  Like
+    ``mds`` it needs a convex flat image.  A direct solve, so a start changes nothing.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def isomap(problem: Problem, start: Floats | None, options: IsomapOptions) -> Fl
     start : (n, 2) float or None
         Not used.
     options : IsomapOptions
-        See there.
+        Neighbours and landmarks.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def lscm(problem: Problem, start: Floats | None, options: LscmOptions) -> Flatte
 
     The two outermost border vertices of the start are pinned.  Where libigl fails, returns
     positions that are not finite or collapses the surface (issues 2409 and 54), a second
-    pair across the first is tried, which the note tells; failing that, FlatteningError.
+    pair across the first is tried, with a note; if it fails too, FlatteningError.
     A conformal map keeps angles, not lengths.
 
     Parameters
@@ -73,7 +73,7 @@ def _solve(problem: Problem, pins: Ints) -> Floats:
 
 
 def _scaled(problem: Problem, uv: Floats) -> Floats:
-    """Return the map at the folded area, or FlatteningError where it has collapsed."""
+    """Return the map at the folded area, or FlatteningError if it has collapsed."""
     area = float(triangle_areas(uv, problem.mesh.F).sum())
     if not area > 0:
         raise FlatteningError("the conformal map has collapsed: its signed area is not positive")

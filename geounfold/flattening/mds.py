@@ -40,12 +40,11 @@ class MdsOptions:
 
 
 def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flattening:
-    """Flatten by classical scaling of distances along the surface (``_landmarks`` says how).
+    """Flatten by classical scaling of distances along the surface (see ``_classical_scaling``).
 
-    Exact where the surface is developable and
-    its flat image convex: elsewhere shortest paths bend round the border, and distances are
-    shorter than in the plane.  Nothing bars triangles from folding.  A direct solve, so a start
-    changes nothing.
+    Exact if the surface is developable and its flat image convex.  Else shortest paths bend round
+    the border, and distances are shorter than in the plane.  Triangles may fold.  A direct solve,
+    so a start changes nothing.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flatteni
     start : (n, 2) float or None
         Not used.
     options : MdsOptions
-        See there.
+        Number of landmarks.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 Each takes V (n, 3) folded vertices in any unit, F (m, 3) faces and uv (n, 2) flat positions in
 the same unit.  Stretches are the singular values s1 >= s2 of the map's Jacobian on each face, s2
-negative where the face is flipped; means are weighted by folded area.
+negative if the face is flipped; means are weighted by folded area.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def edge_strain(V: Floats, F: Ints, uv: Floats) -> float:
 
 
 def area_distortion(V: Floats, F: Ints, uv: Floats) -> float:
-    """Return the mean of (s1 s2 + 1/(s1 s2)) / 2: 1 where areas are kept, inf with a flip."""
+    """Return the mean of (s1 s2 + 1/(s1 s2)) / 2: 1 if areas are kept, inf with a flip."""
     s1, s2 = stretches(V, F, uv)
     if not (s2 > 0).all():
         return float("inf")
@@ -55,7 +55,7 @@ def area_distortion(V: Floats, F: Ints, uv: Floats) -> float:
 
 
 def angle_distortion(V: Floats, F: Ints, uv: Floats) -> float:
-    """Return the mean of (s1/s2 + s2/s1) / 2: 1 where angles are kept, inf with a flip."""
+    """Return the mean of (s1/s2 + s2/s1) / 2: 1 if angles are kept, inf with a flip."""
     s1, s2 = stretches(V, F, uv)
     if not (s2 > 0).all():
         return float("inf")

@@ -29,8 +29,8 @@ def scaf(problem: Problem, start: Floats | None, options: ScafOptions) -> Flatte
 
     The plane around the surface and its holes are meshed too, and no triangle of that mesh may
     flip either: the border cannot meet itself.  Each step is checked by exact predicates; one
-    that is not finite or not one-to-one ends the run at the step before it, which the note
-    tells.  So the answer is one-to-one whatever libigl does.
+    that is not finite or not one-to-one ends the run at the step before it, with a
+    note.  So the answer is one-to-one whatever libigl does.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def scaf(problem: Problem, start: Floats | None, options: ScafOptions) -> Flatte
     start : (n, 2) float or None
         Flat positions to start from; None, or ones not one-to-one, take Tutte's embedding.
     options : ScafOptions
-        See there.
+        When to stop.
     """
     F, loops, uv, note = problem.mesh.F, problem.loops, start, ""
     if uv is not None and not is_one_to_one(uv, F, loops):
@@ -58,7 +58,7 @@ def scaf(problem: Problem, start: Floats | None, options: ScafOptions) -> Flatte
 
 
 def scaffold_run(problem: Problem, uv: Floats, options: IterationOptions) -> Run:
-    """Return the descent from one-to-one positions; FlatteningError where libigl cannot begin."""
+    """Return the descent from one-to-one positions; FlatteningError if libigl cannot begin."""
     F, loops = problem.mesh.F, problem.loops
     try:
         steps = ScaffoldSteps(problem.mesh.V, F, uv)

@@ -26,10 +26,10 @@ class SlimOptions(IterationOptions):
 def slim(problem: Problem, start: Floats | None, options: SlimOptions) -> Flattening:
     """Flatten by libigl's SLIM: the mean of s1^2 + s2^2 + 1/s1^2 + 1/s2^2 over the folded area.
 
-    The energy is infinite where a triangle has lost its area, and every step stops short of that:
-    nothing flips.  The border may still cross itself.  Each step is checked by an exact
+    The energy is infinite if a triangle has no area, and every step stops short of that: nothing
+    flips.  The border may still cross itself.  Each step is checked by an exact
     predicate; one that is not finite or flips a triangle ends the run at the step before it,
-    which the note tells.
+    with a note.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def slim(problem: Problem, start: Floats | None, options: SlimOptions) -> Flatte
     start : (n, 2) float or None
         Flat positions to start from; None, or flipped triangles, take Tutte's embedding.
     options : SlimOptions
-        See there.
+        When to stop.
     """
     F, uv, note = problem.mesh.F, start, ""
     if uv is not None and len(turned_over(uv, F)):

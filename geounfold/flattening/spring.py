@@ -38,18 +38,18 @@ PLANAR = 0.25
 #: Edge strain (root mean square) of a given start above which rigid steps come first.
 NEAR = 0.05
 
-#: Steps of SLIM before the barrier is added, where the start is far from its rest lengths.
+#: Steps of SLIM before the barrier is added, if the start is far from its rest lengths.
 NEARER = 10
 
 #: Residual of a Newton step's equations, as a share of their load: from fine to rough.
 RESIDUAL = (1e-5, 1e-2)
 
-#: Residual of the first Newton step's equations where the rigid steps' Laplacian stands in for the
+#: Residual of the first Newton step's equations if the rigid steps' Laplacian replaces the
 #: Hessian's factors, and most conjugate gradient steps for that: the factors cost as much as about
 #: twice as many on 100,000 triangles.
 ROUGH, ROUGH_STEPS = 1e-2, 25
 
-#: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard where a vertex
+#: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard if a vertex
 #: and its neighbours lie on one line.
 RIDGE = 1e-8
 
@@ -75,26 +75,26 @@ def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Fl
     """Flatten by minimising ``E = sum (|P_i P_j| - d_j)^2 / 2`` (thesis section 2.2.4, C = 1).
 
     A start of its own, or one far from its rest lengths, is first relaxed by a few rigid (ARAP)
-    steps; then Newton's method minimises the springs' energy, with the exact Hessian where that
-    gives a descent, else without the shortened springs' negative parts.  Springs alone may fold a
+    steps; then Newton's method minimises the springs' energy, with the exact Hessian if that gives
+    a descent, else without the shortened springs' negative parts.  Springs alone may fold a
     surface over at its minimum, doubly curved ones above all.  Such an answer is redone from
     the last start without flips, brought near its rest lengths by a few steps of SLIM, with a
-    barrier against lost triangles added; the note says so.
+    barrier against lost triangles added, with a note.
 
     Parameters
     ----------
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes the projection on the best-fit plane, where no
-        triangle is folded over and lengths are not too far off, else Tutte's embedding.
+        Flat positions to start from; None takes the projection on the best-fit plane if no
+        triangle is folded over there and lengths are not too far off, else Tutte's embedding.
     options : SpringOptions
-        See there.
+        When to stop.
 
     Returns
     -------
     Flattening
-        ``energy`` holds the start's, the relaxed start's (where there was one) and each Newton
+        ``energy`` holds the start's, the relaxed start's (if there was one) and each Newton
         step's energy; with the barrier it includes the barrier's.
     """
     first = _own_start(problem) if start is None else start
@@ -142,7 +142,7 @@ def _guarded(
 
 
 def _own_start(problem: Problem) -> Floats:
-    """Return the projection on a plane where that is a sound start, else Tutte's embedding."""
+    """Return the projection on a plane if that is a sound start, else Tutte's embedding."""
     flat = plan(problem)
     sound = _strain(problem, flat) <= PLANAR and not flip_count(flat, problem.mesh.F)
     return flat if sound else tutte(problem)
@@ -210,7 +210,7 @@ class _System:
         self._first_load = 0.0
 
     def energy(self, uv: Floats) -> float:
-        """Return the energy; infinite where the barrier is broken."""
+        """Return the energy; infinite if the barrier is broken."""
         value = spring_energy(uv, self.problem.edges, self.problem.rest)
         return value if self.guard is None else value + self.guard.energy(uv)
 
@@ -226,7 +226,7 @@ class _System:
         return force
 
     def newton_step(self, uv: Floats, force: Floats, convex: bool) -> Floats | None:
-        """Return the solution of ``H s = force``, (n, 2); None where H cannot be factored."""
+        """Return the solution of ``H s = force``, (n, 2); None if H cannot be factored."""
         matrix, load = self._hessian(uv, convex), self._pattern.scatter(force)
         self._first_load = self._first_load or float(np.linalg.norm(load))
         if self._rough is not None:
@@ -245,7 +245,7 @@ class _System:
         return self._pattern.gather(self._factors.solve(load))
 
     def _rough_step(self, matrix: sp.csc_array, load: Floats) -> Floats | None:
-        """Return the first step solved roughly, (n, 2), or None where the Laplacian serves badly.
+        """Return the first step solved roughly, (n, 2), or None if the Laplacian serves badly.
 
         Vertex 0 stays, as the Hessian's pins have it.
         """
@@ -333,7 +333,7 @@ def _descend(
 def _one_step(system: _System, uv: Floats, energy: float) -> tuple[Floats, float, float]:
     """Return positions and energy after one step, and the decrease its model predicts.
 
-    The same positions come back where no decrease was found.
+    The same positions come back if no decrease was found.
     """
     force = system.forces(uv)
     predicted = 0.0

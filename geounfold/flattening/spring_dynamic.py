@@ -91,7 +91,7 @@ def spring_dynamic(
 
     The thesis's ``stop_rule`` is kept with its defects: it ends after a few steps, with the
     surface hardly flattened, as soon as the energy rebounds; and never on a surface that is flat
-    already, where nothing ever rises: ``max_iter`` ends it there.
+    already, because nothing ever rises there: ``max_iter`` ends it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def spring_dynamic(
         Flat positions to start from; None takes Tutte's embedding after a few rigid (ARAP) steps,
         or, with the thesis's stop rule, the projection on the best-fit plane.
     options : SpringDynamicOptions
-        See there.
+        Stop rule, time step and damping.
     """
     thesis = options.stop_rule == "thesis"
     uv = _initial(problem, options) if start is None else start
@@ -166,7 +166,7 @@ class Motion:
         self._velocity = np.zeros_like(self._velocity)
 
     def energy(self, uv: Floats) -> float:
-        """Return the springs' energy, or FlatteningError where the motion has blown up."""
+        """Return the springs' energy, or FlatteningError if the motion has diverged."""
         value = spring_energy(uv, self.problem.edges, self.problem.rest)
         if not np.isfinite(value):
             raise FlatteningError(

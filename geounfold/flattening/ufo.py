@@ -47,19 +47,19 @@ class UfoOptions(IterationOptions):
 def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flattening:
     """Flatten by releasing the springs' energy from the surface's projection on a plane.
 
-    U-Fo itself is closed.  The thesis says of it (sections 1.1, 2.3.2, 4.1) that one reference
+    U-Fo itself is closed.  By the thesis (sections 1.1, 2.3.2, 4.1) one reference
     surface is flattened by a conservative spring model, the one it takes over from Wang: springs
     along the edges, as long at rest as on the folded surface; masses without damping; the
     integrator of section 2.2.4; a planar start.  So this is ``spring_dynamic`` with its thesis
-    options, in two respects told apart:
+    options, with two differences:
 
-    * Each release ends where the springs' energy rises, and the next one starts there at rest,
+    * Each release ends when the springs' energy rises, and the next one starts there at rest,
       until nothing moves.  The kinetic energy taken away is what is released: without damping
       the motion would never end.  The thesis ends with the first release.
     * The area error, at whose rise the thesis stops too, ends nothing: it may rise on the way.
 
     From ``spring`` it differs by all that makes that one safe: there are no rigid steps first, no
-    second derivatives, no barrier.  Where the projection on the plane overlaps, as that of an
+    second derivatives, no barrier.  If the projection on the plane overlaps, as that of an
     overturned fold does, the springs relax with triangles folded over and stay so; the note
     counts them.
 
@@ -70,7 +70,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
     start : (n, 2) float or None
         Flat positions to start from; None takes the projection on the best-fit plane.
     options : UfoOptions
-        See there.
+        Time step and when to stop.
 
     Raises
     ------

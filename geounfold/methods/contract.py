@@ -1,4 +1,4 @@
-"""What every method of whole bodies is given, and what it returns."""
+"""Input and output of every method of whole bodies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Stage = Callable[[str], AbstractContextManager[None]]
 
 @dataclass(frozen=True, eq=False)
 class PreparedBody:
-    """What a method is given of one body, in working units.
+    """Input of a method for one body, in working units.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class PreparedBody:
     frame : Frame
         Working frame.
     hull : Hull or None
-        None where reference surfaces were given.
+        None if reference surfaces were given.
     split : SurfaceSplit
         The hull's (or the reference surfaces') faces as top, bottom and rim.
     up : (3,) float
         World direction that the top is to look to, as a unit vector.
     datum : str
-        Which surface is to be flat; sides as in ``split``.
+        Surface that becomes flat; sides as in ``split``.
     flattener : str
         A name in FLATTENERS.
     flattener_options : dataclass or None
@@ -59,9 +59,9 @@ class PreparedBody:
     sheet_options : SheetOptions
         How reference surfaces are fitted.
     stage : callable
-        See Stage.
+        Times and names a stage: ``with stage("hull"):``.
     coarse : MergedBlocks or None
-        The points merged into cells, where they are many; hull and split are in its unit then.
+        The points merged into cells, if they are many; hull and split then are in its unit.
     """
 
     points: Floats
@@ -92,9 +92,9 @@ class Placed:
     Attributes
     ----------
     points : (n, 3) float
-        Their images, working units; NaN where there is none.
+        Their images, working units; NaN if there is none.
     stratigraphic : (n,) float
-        0 at the bottom surface, 1 at the top; NaN where there is no image.
+        0 at the bottom surface, 1 at the top; NaN if there is no image.
     anchored : (n,) bool
         Whether the surfaces hold the point; else they were continued past their border.
     """
@@ -115,7 +115,7 @@ class Pointwise(Protocol):
         """Place folded points (n, 3) in the flat space."""
 
     def to_folded(self, points: Floats) -> Floats:
-        """Return flat points (n, 3) in the folded space, NaN where there is no place."""
+        """Return flat points (n, 3) in the folded space, NaN if there is no place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,7 @@ class SurfacePair:
     def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
         """Return the surface in one space for pyvista.
 
-        The point data of the other space's name, (n, 3), holds where each vertex lies there.
+        The point data of the other space's name, (n, 3), holds each vertex's place there.
         """
         here, there, other = in_space(space, self.folded, self.unfolded)
         surface = here.to_pyvista()
@@ -150,7 +150,7 @@ class BodyFit:
     Attributes
     ----------
     hull : Hull or None
-        None where reference surfaces were given.
+        None if reference surfaces were given.
     split : SurfaceSplit
         The hull's faces as top, bottom and rim.
     control : ControlMesh or None
@@ -162,7 +162,7 @@ class BodyFit:
     flattenings : dict of Flattening
         Every surface that was flattened.
     sheet : SheetResult or None
-        The sheet method's stages, where they were gone through.
+        The sheet method's stages, if the method has them.
     notes : dict
         Figures of the method for the summary.
     rule : Pointwise or None
@@ -170,7 +170,7 @@ class BodyFit:
     points : (n, 3) float or None
         The body's blocks, which such a map is good for.
     warnings : tuple of str
-        What the method could not do for this body, one sentence each.
+        One sentence each.
     """
 
     hull: Hull | None
@@ -201,14 +201,14 @@ class Method:
     control : bool
         Whether its map is a control mesh: can be certified, saved and drawn.
     reach : float or None
-        How far past the control mesh points are carried, in blocks, where that is not asked of
-        the user: methods whose mesh leaves blocks outside and has no shell.
+        Distance from the control mesh, in blocks, up to which points are carried, for methods
+        with a mesh that leaves blocks outside and has no shell; None takes the user's.
     hull : str
-        What the hull ``auto`` stands for.
+        The hull that ``auto`` takes.
     surfaces : bool
-        Whether it takes reference surfaces in place of a hull.
+        Whether it accepts reference surfaces in place of a hull.
     flattens : bool
-        Whether the flattener matters to it.
+        Whether it uses the flattener.
     """
 
     name: str

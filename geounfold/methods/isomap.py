@@ -64,10 +64,10 @@ def fit_isomap(body: PreparedBody) -> BodyFit:
     """Return the map of a body by landmark Isomap (Caixeta and Costa 2021).
 
     Points of the mid surface are joined with their nearest neighbours; the shortest paths along
-    the graph stand for lengths along the surface, and classical scaling of the paths between the
+    the graph replace lengths along the surface, and classical scaling of the paths between the
     landmarks (de Silva and Tenenbaum 2004) lays the surface flat.  A block starts over the
-    nearest point of the surface, as high as it is far from it, and then moves to where its
-    distances to the nearest placed points are, in the least squares, those of the folded body.
+    nearest point of the surface, at its distance from it.  It then moves to the place at
+    which its distances to the nearest placed points are, in the least squares, the folded body's.
 
     What differs from Unfolding.jl: the mid surface is the one that ``sheet`` fits, not thinned
     sections; landmarks are the farthest from each other, not drawn; the least squares are solved
@@ -148,7 +148,7 @@ def _first_largest(values: Floats) -> int:
 
 
 def _onto(uv: Floats, mid: TriMesh, flat: Floats) -> Floats:
-    """Return the scaled positions mirrored back where they are mirrored, and turned onto flat."""
+    """Return the scaled positions mirrored back if they are mirrored, and turned onto flat."""
     a, b, c = (uv[mid.F[:, k]] for k in range(3))
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     if area.sum() < 0:
@@ -191,7 +191,7 @@ def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
 
 
 def _sound(P: Floats, flat: Floats) -> Bools:
-    """Return the points whose distances to their neighbours are off by no more than allowed."""
+    """Return the points with distances to their neighbours that are off by at most 2.5 blocks."""
     near = np.asarray(cKDTree(P).query(P, k=_NEAR)[1], dtype=np.int64)
     out = np.ones(len(P), dtype=bool)
     for start in range(0, len(P), _CHUNK):
@@ -223,7 +223,7 @@ class _Known:
         return np.asarray(distance), self._flat[near]
 
     def place(self, Q: Floats, guess: Floats) -> Floats:
-        """Return points (k, 3) moved from a guess to where their distances fit best."""
+        """Return points (k, 3) moved from a guess to the places that fit their distances best."""
         out = np.empty_like(guess)
         for start in range(0, len(Q), _CHUNK):
             rows = slice(start, start + _CHUNK)
@@ -277,7 +277,7 @@ class NeighbourRule:
     known, placed : (n, 3) float
         The points in both spaces.
     sheet : SheetResult
-        Whose top and bottom give the stratigraphic coordinate.
+        Its top and bottom give the stratigraphic coordinate.
     """
 
     known: Floats
@@ -291,7 +291,7 @@ class NeighbourRule:
         return _Known(self.known, self.placed)
 
     def to_flat(self, points: Floats) -> Placed:
-        """Place folded points: at their own place where they are known, else by distances."""
+        """Place folded points: at their own place if they are known, else by distances."""
         away, guess = self._tree.nearest(points)
         out, rest = guess.copy(), away > _OWN
         out[rest] = self._tree.place(points[rest], guess[rest])

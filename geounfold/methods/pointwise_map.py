@@ -28,7 +28,7 @@ class PointwiseMap:
     rule : Pointwise
         The map, in working units.
     blocks : (b, 3) float
-        The body, working units: a point is inside where a block holds it, to half a block's
+        The body, working units: a point is inside if a block holds it, to half a block's
         diagonal, and has no image farther off than the reach.
     reach : float
         How far past the body points are carried, in blocks.
@@ -76,8 +76,8 @@ class PointwiseMap:
         Returns
         -------
         Carried
-            ``inside``: within the body, and where its surfaces are; ``element`` is -1 everywhere.
-            On the way back nothing is said of the stratigraphic coordinate.
+            ``inside``: within the body and over its surfaces; ``element`` is -1 everywhere.
+            On the way back the stratigraphic coordinate is NaN.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class PointwiseMap:
         )
 
     def returned(self, points: Floats, carried: Carried) -> Returned | None:
-        """Return how points (n, 3) come back from where they were carried, None without a way."""
+        """Return how points (n, 3) come back from their images, None without a way back."""
         if not self.rule.way_back:
             return None
         back = self.carry(carried.points, inverse=True)
@@ -128,12 +128,12 @@ class PointwiseMap:
         return self.carry(points, inverse=True).points
 
     def save(self, path: str | Path | BinaryIO) -> None:
-        """Raise OptionError: what is saved is a control mesh."""
+        """Raise OptionError: only a control mesh can be saved."""
         raise OptionError(no_mesh(self.name, "its map cannot be saved"))
 
 
 def no_mesh(method: str, what: str) -> str:
-    """Return the sentence that says what cannot be had without a control mesh."""
+    """Return the error message on something that needs a control mesh."""
     return f"method {method} has no control mesh, so {what}: use --method sheet"
 
 

@@ -11,7 +11,7 @@ def fit_stratigraphic(body: PreparedBody) -> BodyFit:
 
     ``z = (share - 1/2) T`` with ``share = (height - bottom) / (top - bottom)`` along the vertical
     and T the mean vertical thickness over the blocks: the coordinate in which tabular deposits
-    are estimated where top and bottom have a height each (geostatisticslessons.com,
+    are estimated if top and bottom have one height at each place (geostatisticslessons.com,
     stratcoords).  ``datum`` does not matter, since both surfaces become level.
 
     Raises

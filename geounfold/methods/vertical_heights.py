@@ -52,14 +52,14 @@ class Heights(NamedTuple):
 
 
 class HeightField:
-    """A surface as a height over a plane: the outermost where there are several.
+    """A surface as a height over a plane: the outermost if there are several.
 
     Parameters
     ----------
     mesh : TriMesh
         The surface; vertical is z.
     side : int
-        +1 where the highest of several heights counts, -1 where the lowest does.
+        +1 if the highest of several heights counts, -1 if the lowest does.
     """
 
     def __init__(self, mesh: TriMesh, side: int) -> None:
@@ -74,7 +74,7 @@ class HeightField:
         """Return the heights at places (n, 2).
 
         Past the surface's border it is continued by the plane of the nearest triangle, level
-        where that is steep.
+        if that is steep.
         """
         outer, inner = (self._first(xy, side) for side in (self._side, -self._side))
         met = np.isfinite(outer)
@@ -141,7 +141,7 @@ class VerticalRule:
         return VerticalColumn(low.z, high.z, low.met & high.met, low.several | high.several)
 
     def to_flat(self, points: Floats) -> Placed:
-        """Place folded points; none where the top does not lie over the bottom."""
+        """Place folded points; none if the top does not lie over the bottom."""
         P = points @ self.turn.T
         at = self.column(P[:, :2])
         half = (at.top - at.bottom) / 2
@@ -229,7 +229,7 @@ def _upright(body: PreparedBody) -> Floats:
 
 
 def vertical_warnings(at: VerticalColumn, blocks: int) -> tuple[tuple[str, ...], dict[str, object]]:
-    """Return what is ambiguous about a body's columns, in sentences and in figures."""
+    """Return warnings about ambiguous columns of a body, and their counts."""
     counts = {
         "ambiguous": int(at.several.sum()),
         "crossed": int((at.met & (at.top - at.bottom <= _SAME)).sum()),
@@ -237,7 +237,7 @@ def vertical_warnings(at: VerticalColumn, blocks: int) -> tuple[tuple[str, ...],
     }
     said = {
         "ambiguous": "stand where a vertical line meets the top or the bottom more than once; the "
-        "outermost was taken, so limbs that overhang are not told apart",
+        "outermost was taken, so overhanging limbs fall together",
         "crossed": "stand where the bottom lies over the top; they were left empty",
     }
     out = tuple(f"{counts[k]} of {blocks} blocks {words}" for k, words in said.items() if counts[k])

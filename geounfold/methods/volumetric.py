@@ -47,18 +47,18 @@ class VolumetricOptions:
 def fit_volumetric(body: PreparedBody) -> BodyFit:
     """Return the map of least volumetric strain between flat top and bottom.
 
-    The prisms over the mid surface (those of ``ufo``, from whose map it starts) deform so that
+    The prisms over the mid surface (those of ``ufo``, and from its map) deform so that
     the symmetric Dirichlet energy, summed over their tetrahedra by folded volume, is least:
     libigl's SLIM (Rabinovich et al. 2017), which inverts none.  The mesh's top and bottom are
     drawn softly to the planes at their mean heights; along these planes they are free.
 
     The energy counts every strain alike, so it spends as little shear as it can: it bends a
-    layer back like a beam, where flexural slip shears it.
+    layer back like a beam, whereas flexural slip shears it.
 
     Raises
     ------
     SplitError, FlatteningError
-        As the stages do; and where the start has inverted tetrahedra or libigl fails.
+        As the stages do; and if the start has inverted tetrahedra or libigl fails.
     """
     chosen: VolumetricOptions = body.options
     anchored = anchor(body)

@@ -16,7 +16,7 @@ from geounfold.unfolding.options import UnfoldOptions
 
 
 def check_method(options: UnfoldOptions) -> None:
-    """Raise OptionError where the method proves nothing, unless that is allowed."""
+    """Raise OptionError if the method proves nothing, unless that is allowed."""
     if METHODS[options.method].control:
         return
     if options.coordinates != "tet":
@@ -32,7 +32,7 @@ def check_method(options: UnfoldOptions) -> None:
 
 
 def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
-    """Raise OptionError where a method without a control mesh is to unfold several bodies."""
+    """Raise OptionError if a method without a control mesh is to unfold several bodies."""
     if len(groups) > 1 and not METHODS[options.method].control:
         raise OptionError(
             no_mesh(options.method, "it unfolds one body at a time") + ", or choose one by --body"
@@ -40,7 +40,7 @@ def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
 
 
 def check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
-    """Raise ControlMeshError where neighbours were torn apart, unless that is allowed."""
+    """Raise ControlMeshError if neighbours were torn apart, unless that is allowed."""
     if not len(torn) or options.allow_uncertified:
         return
     where = ", ".join(f"{c:.6g}" for c in np.median(folded[torn], axis=0))
@@ -54,9 +54,9 @@ def check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
 def check_coordinates(
     quality: Quality, returned: Returned | None, folded: Floats, options: UnfoldOptions
 ) -> None:
-    """Raise ControlMeshError where a prism's coordinates fold or do not come back.
+    """Raise ControlMeshError if a prism's coordinates turn a block over or do not bring it back.
 
-    Unless that is allowed.  That they do neither at any block is no proof.
+    Nothing is raised if that is allowed.  That it happens at no block is no proof.
     """
     if options.coordinates == "tet" or options.allow_uncertified or returned is None:
         return
@@ -74,7 +74,7 @@ def check_coordinates(
 
 
 def check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
-    """Raise ControlMeshError where the map is not proved, unless that is allowed."""
+    """Raise ControlMeshError if the map is not proved, unless that is allowed."""
     if certificate.injective or options.allow_uncertified:
         return
     place = certificate.folded[np.argmax(certificate.blocks)] if len(certificate.folded) else []
@@ -90,7 +90,7 @@ def check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
 def check_placed(
     groups: Sequence[Ints], folded: Floats, carried: Carried, options: UnfoldOptions
 ) -> None:
-    """Raise ControlMeshError where blocks of a body have no image, unless that is allowed."""
+    """Raise ControlMeshError if blocks of a body have no image, unless that is allowed."""
     rows = np.concatenate([group[~carried.placed[group]] for group in groups])
     if not len(rows) or options.allow_uncertified:
         return

@@ -51,7 +51,7 @@ def _missing(error: ImportError) -> MissingDependencyError:
 def map_partitions(
     mapping: UnfoldingMap | PointwiseMap, frame: DataFrame, *, inverse: bool = False
 ) -> DataFrame:
-    """Return a Dask DataFrame with where its points come to lie, computed where it is.
+    """Return a Dask DataFrame with the images of its points, computed on its own workers.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def carry_parts(
     folder : path
         Where ``part-00000.parquet`` (or .csv) and so on are written.
     how : Carrying
-        See there.
+        Columns, direction and kind of files.
 
     Returns
     -------

@@ -65,7 +65,7 @@ def fit(
 
 
 _TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoSheetError, SplitError)
-"""What a body's shape may do to merged blocks and not to the blocks themselves."""
+"""Errors that merged blocks may cause on bodies that the single blocks do not."""
 
 
 def _merges(
@@ -73,7 +73,7 @@ def _merges(
 ) -> tuple[int, ...]:
     """Return how many blocks to merge along a cell's side, the most first (see merge_sizes).
 
-    Scattered points are left as they are: nothing tells how full such cells are.
+    Scattered points are not merged: the share of such a cell that is full is not known.
     """
     above = options.sheet_options.merge_above
     if reference is not None or options.method != "sheet" or len(points) <= above:
@@ -129,8 +129,8 @@ def _fit_at(
 def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:
     """Return whether the split's top side looks away from up, (3,) in working units.
 
-    Decided once for the whole sheet by the area-weighted normals of its top; a sheet whose
-    mean normal is square to up (within 3 degrees) keeps the top the split chose.
+    The area-weighted mean normal of the top decides for the whole sheet.  If it is square to up
+    (within 3 degrees), the split's own top is kept.
     """
     mean = mean_top_normal(parts)
     return bool(mean @ up < -0.05 * float((mean @ mean) ** 0.5))

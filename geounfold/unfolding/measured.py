@@ -1,4 +1,4 @@
-"""What a map does with the points of its run: where they go, what is proved, how good it is."""
+"""Images of a run's points, and what is proved and measured of the map."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
 def _torn(
     groups: Sequence[Ints], work: Floats, carried: Carried, quality: Quality, frame: Frame
 ) -> Ints:
-    """Return the rows whose touching blocks in their own body came to lie far away."""
+    """Return the rows of blocks that touch another of their body and now lie far from it."""
     flat = carried.points / frame.scale
     found = []
     for group in groups:
@@ -101,7 +101,7 @@ def _torn(
 
 
 def _gradients(mapping: UnfoldingMap, folded: Floats, carried: Carried) -> Floats | None:
-    """Return the gradients at points with an image; None where they are the tetrahedra's."""
+    """Return the gradients at points with an image; None if they are the tetrahedra's."""
     if mapping.prisms is None:
         return None
     return mapping.gradients(folded[carried.placed], carried.element[carried.placed])
@@ -135,6 +135,6 @@ def _quality(
 
 
 def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
-    """Return a certificate whose places are in the data's coordinates and unit."""
+    """Return a certificate with places in the data's coordinates and unit."""
     folded = frame.to_world(certificate.folded)
     return replace(certificate, folded=folded, unfolded=certificate.unfolded * frame.scale)

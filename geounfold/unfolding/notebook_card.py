@@ -1,4 +1,4 @@
-"""How an unfolding introduces itself: in one line, and as a small table in notebooks."""
+"""An unfolding in one line, and as a small table in notebooks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from html import escape
 
 @dataclass(frozen=True)
 class Facts:
-    """What is said of an unfolding.
+    """Facts of an unfolding for its line and its table.
 
     Attributes
     ----------
@@ -17,22 +17,22 @@ class Facts:
         How many points and bodies were unfolded, and how many points the control mesh does not
         hold.
     method : str
-        That made the map.
+        The method that made the map.
     faults : sequence of str
-        Why the map is not proved one-to-one; empty where it is.
+        Why the map is not proved one-to-one; empty if it is.
     checked : int
-        Tetrahedra that the certificate looked at.
+        Tetrahedra that the certificate checked.
     epsilon, epsilon_p95 : float
         Relative change of the distances to the neighbours: mean and 95th percentile.
     volume : float
         Volume of the body, unfolded over folded.
     round_trip : float or None
-        Largest distance between a point and where the map brings it there and back; None where
-        there is no way back.
+        Largest distance between a point and its image carried back; None if there is no way
+        back.
     seconds : float
         The run's.
     warnings : sequence of str
-        What to distrust.
+        One sentence each.
     """
 
     points: int

@@ -173,8 +173,8 @@ class Unfolding:
         Parameters
         ----------
         space : {"folded", "unfolded"}
-            Where the points lie; the point data of the other's name, (n, 3), holds where they
-            lie there.  Unfolded, points without an image (location outside) are left out.
+            Space of the points; the point data of the other space's name, (n, 3), holds their
+            places there.  Unfolded, points without an image (location outside) are left out.
         """
         from geounfold.io.formats.vtk import cloud
 
@@ -245,7 +245,7 @@ class Unfolding:
     def round_trip_max(self) -> float | None:
         """Largest distance between a point and its return, over those that have both.
 
-        None where the method has no way back.
+        None if the method has no way back.
         """
         return self._record.round_trip_max
 

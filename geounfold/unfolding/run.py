@@ -69,7 +69,7 @@ def unfold(
         Centroids in any length unit and any coordinates; of a DataFrame the coordinate
         columns are found by name (centroid_x/y/z, x/y/z, XC/YC/ZC, easting/...).
     options : UnfoldOptions, optional
-        Defaults where not given.
+        Defaults if not given.
     top, bottom : TriMesh or (V, F), optional
         Hanging wall and footwall in the points' coordinates, in place of an extracted hull;
         both or neither.
@@ -88,7 +88,7 @@ def unfold(
         Points that are no body (too few, flat, several bodies, no sheet), or options outside
         their valid values.
     HullError, SplitError, FlatteningError, ControlMeshError
-        A stage failed; the message says where and what to try.
+        A stage failed; the message names the place and what to try.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def _reference(
 def _one_map(
     fits: list[BodyFit], frame: Frame, options: UnfoldOptions
 ) -> UnfoldingMap | PointwiseMap:
-    """Return the map of all bodies, without shells where those are in each other's way."""
+    """Return the map of all bodies, without shells if these overlap."""
     rules = [(f.rule, f.points) for f in fits if f.rule is not None and f.points is not None]
     if rules:
         return PointwiseMap(options.method, frame, *rules[0], options.reach)

@@ -72,8 +72,14 @@ def test_unfold_tells_a_disagreement_in_its_summary_and_on_stderr(folder, monkey
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--meshers", "gmsh"), "unknown mesher: gmsh; choose from tetwild, tetgen"),
-        (("--interiors", ""), "unknown interior: none; choose from harmonic, arap"),
+        (
+            ("--meshers", "gmsh"),
+            "meshers must be a list of one or more of tetwild, tetgen, but is ['gmsh']",
+        ),
+        (
+            ("--interiors", ""),
+            "interiors must be a list of one or more of harmonic, arap, but is ['']",
+        ),
         (("-o", "t.xlsx"), "t.xlsx"),
         (("-o", "p.csv"), "p.csv"),
         (

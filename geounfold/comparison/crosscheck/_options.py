@@ -1,13 +1,12 @@
-"""What can be chosen for a cross-check of meshes."""
+"""Options of a cross-check of meshes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-import numpy as np
-
-from geounfold.errors import OptionError
+from geounfold.errors import check_number, check_words
 
 MESHERS = {"tetwild": "pytetwild", "tetgen": "tetgen"}
 """Meshers by name, and the package of each; tetgen (AGPL) comes with the extra ``tetgen``."""
@@ -24,21 +23,22 @@ class CrossCheckOptions:
     Parameters
     ----------
     meshers : tuple of str or "auto"
-        Names in MESHERS; ``auto``: tetwild, and tetgen where it is installed.
+        Meshers, by their names in MESHERS; ``auto`` is tetwild, and tetgen if it is installed.
     interiors : tuple of str
-        Names in INTERIORS.
+        How the inside of a mesh is laid flat, by names in INTERIORS.
     edge : float
-        Length of edges aimed at, in blocks.
+        Edge length that the meshers aim at, in blocks.
     envelope : float
-        How far tetwild's border may lie from the control mesh's, in blocks.
+        Largest distance of tetwild's border from the control mesh's, in blocks.
     volume_bound : float
-        Relative difference of volumes from which on there is a warning.
+        Relative difference of volumes above which there is a warning.
     border_bound : float
-        Distance of borders, in blocks, likewise.
+        Distance between borders, in blocks, above which there is a warning.
     position_bound : float
-        Root mean square difference of the blocks' flat places, in blocks, likewise.
+        Root mean square difference of the blocks' flat places, in blocks, above which there is a
+        warning.
     seconds : float
-        Wall time after which a mesher is stopped; its row says so.
+        Wall time after which a mesher is stopped, with a note in its row.
 
     Raises
     ------
@@ -57,13 +57,11 @@ class CrossCheckOptions:
 
     def __post_init__(self) -> None:
         if self.meshers != "auto":
-            object.__setattr__(self, "meshers", _names(self.meshers, MESHERS, "mesher"))
-        object.__setattr__(self, "interiors", _names(self.interiors, INTERIORS, "interior"))
+            object.__setattr__(self, "meshers", _names("meshers", self.meshers, MESHERS))
+        object.__setattr__(self, "interiors", _names("interiors", self.interiors, INTERIORS))
         numbers = ("edge", "envelope", "volume_bound", "border_bound", "position_bound", "seconds")
         for name in numbers:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise OptionError(f"crosscheck: {name} must be positive, but is {value}")
+            check_number(name, getattr(self, name), 0, low_open=True)
 
     def chosen(self) -> tuple[str, ...]:
         """Return the meshers to run."""
@@ -74,12 +72,8 @@ class CrossCheckOptions:
         return self.meshers
 
 
-def _names(given: str | tuple[str, ...], valid: object, kind: str) -> tuple[str, ...]:
-    """Return names, each of them known and there at least one."""
-    names = (given,) if isinstance(given, str) else tuple(given)
-    known = list(valid)  # type: ignore[call-overload]
-    unknown = [name for name in names if name not in known]
-    if unknown or not names:
-        what = ", ".join(map(str, unknown)) or "none"
-        raise OptionError(f"unknown {kind}: {what}; choose from {', '.join(known)}")
+def _names(option: str, given: str | tuple[str, ...], valid: Iterable[str]) -> tuple[str, ...]:
+    """Return names, each of them valid and once; a text is one name."""
+    names = (given,) if isinstance(given, str) else given
+    check_words(option, names, valid)
     return tuple(dict.fromkeys(names))

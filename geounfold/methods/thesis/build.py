@@ -95,7 +95,7 @@ def thesis_control(
         Direction towards the top; default the frame's third axis.  It chooses between the two
         directions of the principal axis across the body, along which the surfaces are paired.
     options : ThesisOptions, optional
-        See there.
+        Axis of the pairing and rings to trim.
     inset : float
         How far the hull runs inside the blocks' outer faces (``Hull.inset``).  Only the
         stratigraphic coordinate uses it, so that 0 and 1 are the body's own faces.
@@ -135,7 +135,7 @@ def thesis_control(
     * *Orientation filter.*  Slopes steeper than 72 degrees (normal's z below 0.3) belong to
       neither surface; in the gap both are continued by planes.  A rim that leans by more than 17
       degrees counts as top or bottom.
-    * *No overhang.*  Where one surface covers itself it is no height field: an error.
+    * *No overhang.*  A surface that covers itself is no height field: an error.
     * *Independent flattening* of top and bottom, by edge springs alone.
 
     Defects not kept:

@@ -99,8 +99,8 @@ def joint_plan(blocks: Floats, top: PlanField, bottom: PlanField) -> JointPlan:
     Inserting the vertices of each surface into the other by Delaunay insertion, as Algorithm 1
     does, ends at the Delaunay triangulation of both, whatever the order.  A vertex within
     MERGE of one that is there already is not inserted.  The border are the nodes of a grid
-    of cells under the blocks and one ring more, where not both surfaces are; triangles are kept
-    where they hold a block or their centre lies in such a cell.
+    of cells under the blocks and one ring more, except under both surfaces; triangles are kept
+    if they hold a block or their centre lies in such a cell.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ def upright_frame(points: Floats, up: Floats | None, axis: str) -> Floats:
 
 
 def two_sides(hull: TriMesh, trim: int) -> tuple[Side, Side, float]:
-    """Return top and bottom of a closed, outward hull whose third coordinate is vertical.
+    """Return top and bottom of a closed, outward hull with a vertical third coordinate.
 
     The third answer is the share of the hull away from its rim that the filter missed or took
     for the other side.
@@ -98,7 +98,7 @@ def two_sides(hull: TriMesh, trim: int) -> tuple[Side, Side, float]:
 def _filter(hull: TriMesh) -> tuple[Ints, float]:
     """Return the side of each face by its normal's third component, (m,), and ``steep``."""
     up = np.array([0.0, 0.0, 1.0])
-    true = split(hull, "signed", up)  # raises where the body has no sheet in any direction
+    true = split(hull, "signed", up)  # raises if the body has no sheet in any direction
     try:
         side = split(hull, "normal", up).side
     except NoSheetError as error:

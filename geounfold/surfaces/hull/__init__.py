@@ -53,12 +53,12 @@ def extract_hull(
     steps : (3,) float or None
         Block sides along the axes, working units, product 1; None for scattered points.
     method : str
-        A name in HULLS, or ``auto``: the first of them whose hull is suitable (see
+        A name in HULLS, or ``auto``: the first with a suitable hull (see
         `unsuitability`), with the reason in ``Hull.reason``.
     options : HullOptions, optional
         Lengths and thresholds.
     weights : (n,) float, optional
-        Volume of each point, where it stands for a cell that blocks fill in part; 1 by default.
+        Volume of each point if it is a cell that blocks fill in part; 1 by default.
         Methods but the density take the points of cells that are half full.
 
     Raises
@@ -114,7 +114,7 @@ def _first_suitable(
 
 
 def unsuitability(hull: Hull, points: Floats) -> str:
-    """Return why a hull does not fit the points it was made from; empty where it does.
+    """Return why a hull does not fit the points it was made from; empty if it does.
 
     Its volume must be 0.6 to 1.5 times the blocks', what runs through the outermost centroids
     counted half a block inside, and at most 1 % of the points may lie more than a block outside.

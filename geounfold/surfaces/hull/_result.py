@@ -28,15 +28,15 @@ class Hull:
         Volume of the blocks: their count, as one block is one cubic working unit.
     inset : float
         How far inside the blocks' own outer faces the surface runs, in working units:
-        0.5 where it passes through the outermost centroids, 0 where it encloses the blocks,
-        negative where it runs outside of them.
+        0.5 if it passes through the outermost centroids, 0 if it encloses the blocks,
+        negative if it runs outside of them.
     blur : float
         Standard deviation (working units per unit of block side) of the Gaussian blur the
-        surface was made with; its curvature bias is undone later.  0 where there was none.
+        surface was made with; its curvature bias is undone later.  0 if there was none.
     dropped : int
         Faces of cavities and specks that were left out.
     even : bool
-        True where the blur was as wide along every axis, ``blur`` in working units, though the
+        True if the blur was as wide along every axis, ``blur`` in working units, though the
         blocks' sides differ.
     reason : str
         Why this method was chosen, when the choice was automatic; else empty.

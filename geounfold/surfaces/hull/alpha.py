@@ -155,9 +155,9 @@ def _smallest_alpha(shape: _Complex) -> float:
 
 
 def _manifold_boundary(shape: _Complex, solid: Bools) -> tuple[Floats, Ints]:
-    """Return the solid's boundary, mended at edges and vertices where it touches itself.
+    """Return the solid's boundary, mended at edges and vertices in which it touches itself.
 
-    Narrow wedges at such an edge are filled; where there are none the edge is cut free.
+    Narrow wedges at such an edge are filled; if there are none the edge is cut free.
     """
     narrow = shape.radius.max(axis=1) < WIDEST
     for _ in range(REPAIRS):
@@ -194,7 +194,7 @@ def _around_edges(shape: _Complex, edges: Ints) -> Bools:
 
 
 def _split_fans(points: Floats, F: Ints) -> tuple[Floats, Ints]:
-    """Give each fan of faces around a vertex a vertex of its own, where fans touch in one."""
+    """Give each fan of faces around a vertex a vertex of its own, if fans touch in one."""
     start, end = F.ravel(), F[:, [1, 2, 0]].ravel()
     n = len(points)
     order, back = np.argsort(start * n + end), np.argsort(end * n + start)

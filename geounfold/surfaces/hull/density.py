@@ -58,7 +58,7 @@ _CORNERS = np.array(
 class _Bricks:
     """Values on the occupied bricks of a regular grid.
 
-    ``slot`` (bx, by, bz) is each brick's row in ``values`` (k + 1, s, s, s), or k where there
+    ``slot`` (bx, by, bz) is each brick's row in ``values`` (k + 1, s, s, s), or k if there
     is none; row k is zero.  ``index`` (k, 3) is each row's brick.
     """
 

@@ -1,1 +1,1 @@
-"""The only doors to libigl, pymeshlab and other meshing libraries: plain arrays in and out."""
+"""All calls of libigl, MeshLab, gstlearn, TetGen and fTetWild: plain arrays in and out."""

@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 
 _USERS = ("numpy.linalg._umath_linalg", "scipy.linalg._flapack")
-"""Extension modules that need the library: its symbols are found through them."""
+"""Extension modules that load OpenBLAS; its functions are looked up through them."""
 
 _NAMES = tuple(
     (f"{prefix}openblas_get_num_threads{suffix}", f"{prefix}openblas_set_num_threads{suffix}")
@@ -27,7 +27,7 @@ def _controls() -> tuple[Control, ...]:
     for user in _USERS:
         try:
             library = ctypes.CDLL(str(import_module(user).__file__))
-        except (ImportError, OSError):  # another build: its threads are left alone
+        except (ImportError, OSError):  # another build, without OpenBLAS
             continue
         for getter, setter in _NAMES:
             if hasattr(library, getter) and hasattr(library, setter):
@@ -40,9 +40,9 @@ def _controls() -> tuple[Control, ...]:
 def one_thread() -> Iterator[None]:
     """Keep OpenBLAS to one thread, in the whole process.
 
-    On narrow matrices its threads gain nothing, and they wait for each other by spinning: where
-    another process has one of two cores, factoring a band takes ten to a hundred times longer
-    with two threads.  Other libraries than OpenBLAS are left as they are.
+    On narrow matrices its threads gain nothing, and they wait for each other by spinning: if
+    another process uses one of two cores, factoring a band takes ten to a hundred times longer
+    with two threads than with one. Other libraries than OpenBLAS keep their threads.
     """
     controls = _controls()
     before = [get() for get, _ in controls]

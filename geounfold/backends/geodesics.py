@@ -1,18 +1,18 @@
-"""libigl's distances along a surface and its harmonic functions."""
+"""libigl's geodesic distances on a surface, and its harmonic functions."""
 
 from __future__ import annotations
 
 import igl
 import numpy as np
 
-from geounfold.errors import BackendError
+from geounfold.backends.checks import call_libigl, finite_array
 from geounfold.geometry.mesh import Floats, Ints
 
 _NONE = np.zeros(0, dtype=np.int64)
 
 
 class SurfaceDistances:
-    """Distances along a surface from a vertex to all vertices.
+    """Geodesic distances from one vertex to all vertices, in the vertices' unit.
 
     Parameters
     ----------
@@ -21,8 +21,13 @@ class SurfaceDistances:
     F : (m, 3) int
         Triangles.
     exact : bool
-        Shortest paths over the triangles (Mitchell et al. 1987; n^2 log n at worst), or the heat
-        method (Crane et al. 2013), which errs by about an edge length but factors once.
+        True: shortest paths over the triangles (Mitchell et al. 1987), n^2 log n at worst. False:
+        the heat method (Crane et al. 2013), which errs by about an edge length but factors once.
+
+    Raises
+    ------
+    BackendError
+        libigl failed.
     """
 
     def __init__(self, V: Floats, F: Ints, exact: bool) -> None:
@@ -32,11 +37,8 @@ class SurfaceDistances:
         if exact:
             return
         self._data = igl.HeatGeodesicsData()
-        try:
-            igl.heat_geodesics_precompute(self._V, self._F, self._data)
-        except RuntimeError as err:
-            msg = f"libigl's heat_geodesics_precompute failed: {err}"
-            raise BackendError(msg) from err
+        name = "heat_geodesics_precompute"
+        call_libigl(name, igl.heat_geodesics_precompute, self._V, self._F, self._data)
 
     def __call__(self, vertex: int) -> Floats:
         """Return the distances from a vertex, (n,).
@@ -44,41 +46,40 @@ class SurfaceDistances:
         Raises
         ------
         BackendError
-            libigl refused, or returned distances that are not finite.
+            libigl failed, or returned distances that are not finite.
         """
         source, n = np.array([vertex], dtype=np.int64), len(self._V)
-        name = "exact_geodesic" if self._exact else "heat_geodesics_solve"
-        try:
-            if self._exact:
-                found = igl.exact_geodesic(self._V, self._F, source, _NONE, np.arange(n), _NONE)
-            else:
-                found = igl.heat_geodesics_solve(self._data, source)
-        except RuntimeError as err:
-            msg = f"libigl's {name} failed: {err}"
-            raise BackendError(msg) from err
-        return _finite(np.asarray(found, dtype=np.float64), (n,), name)
+        if self._exact:
+            name, targets = "exact_geodesic", np.arange(n)
+            found = call_libigl(
+                name, igl.exact_geodesic, self._V, self._F, source, _NONE, targets, _NONE
+            )
+        else:
+            name = "heat_geodesics_solve"
+            found = call_libigl(name, igl.heat_geodesics_solve, self._data, source)
+        return finite_array(found, (n,), name)
 
 
 def harmonic(V: Floats, F: Ints, fixed: Ints, values: Floats) -> Floats:
-    """Return the harmonic functions (n, 2), cotangent weights, with given values on ``fixed``.
+    """Return two harmonic functions on a surface, (n, 2), by cotangent weights.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+        Vertices.
+    F : (m, 3) int
+        Triangles.
+    fixed : (k,) int
+        Vertices where the functions are given.
+    values : (k, 2) float
+        The functions there.
 
     Raises
     ------
     BackendError
-        libigl refused, or returned something that is not finite.
+        libigl failed, or returned values that are not finite.
     """
     arrays = np.ascontiguousarray(V, dtype=np.float64), np.ascontiguousarray(F, dtype=np.int64)
-    try:
-        found = igl.harmonic(*arrays, np.ascontiguousarray(fixed), np.array(values, order="C"), 1)
-    except RuntimeError as err:
-        msg = f"libigl's harmonic failed: {err}"
-        raise BackendError(msg) from err
-    return _finite(np.asarray(found, dtype=np.float64), (len(V), 2), "harmonic")
-
-
-def _finite(values: Floats, shape: tuple[int, ...], name: str) -> Floats:
-    """Return the values, or BackendError where they are not finite or of another shape."""
-    if values.shape != shape or not np.isfinite(values).all():
-        msg = f"libigl's {name} returned values that are not finite"
-        raise BackendError(msg)
-    return values
+    given = np.ascontiguousarray(fixed), np.array(values, order="C")
+    found = call_libigl("harmonic", igl.harmonic, *arrays, *given, 1)
+    return finite_array(found, (len(V), 2), "harmonic")

@@ -1,10 +1,9 @@
 """gstlearn: kriging systems and inverse distances, for neighbourhoods chosen by the caller.
 
-gstlearn looks for neighbours itself but knows no largest number per drill-hole, and takes longer
-the more samples there are. Here every target stands on an island of its own, with the samples
-chosen for it and no others: islands lie farther apart than the search reaches, so the library's
-nearest samples are the chosen ones. Covariances depend on differences alone, so nothing else
-changes.
+gstlearn's own search has no largest number of samples per drill-hole, and its time grows with the
+number of samples. Here every target is moved, with the samples chosen for it, to an island of its
+own. Islands lie farther apart than the search reaches, so the library's nearest samples are the
+chosen ones. Covariances depend on differences alone, so nothing else changes.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from geounfold.errors import BackendError, MissingDependencyError
 from geounfold.geometry.mesh import Floats, Ints
 
 ISLANDS = 16
-"""Targets a call: the library's cost per target is lowest there, and offsets stay small."""
+"""Targets per call: the cost per target is least at this number, and offsets stay small."""
 
 _KINDS = {"spherical": "SPHERICAL", "exponential": "EXPONENTIAL", "gaussian": "GAUSSIAN"}
 
 Part = tuple[str, float, Sequence[float]]
-"""Kind, sill and three ranges of a structure."""
+"""Kind, sill and three ranges of a variogram structure."""
 
 
 def library() -> ModuleType:
@@ -56,7 +55,7 @@ def krige(
     structures: Sequence[Part],
     mean: float | None,
 ) -> tuple[Floats, Floats]:
-    """Krige targets from the samples chosen for each.
+    """Return kriging estimates of targets from the samples chosen for each.
 
     Parameters
     ----------
@@ -65,24 +64,26 @@ def krige(
     values : (m, k) float
         The samples' values.
     counts : (m,) int
-        How many of them there are: the first so many of each row; at least 1.
+        Number of samples of each target, at least 1: the first ones of its row.
     nugget : float
-        Variance at no distance.
+        Nugget variance.
     structures : sequence of (kind, sill, ranges)
-        Spherical, exponential or gaussian; ranges are where 5 % of the covariance is left, of the
-        spherical one where none is.
+        Spherical, exponential or gaussian. The range is the distance at which 5 % of the
+        covariance is left; of the spherical one, at which none is.
     mean : float, optional
-        Known mean, for simple kriging; ordinary without.
+        Known mean, for simple kriging; ordinary kriging if None.
 
     Returns
     -------
     estimate, variance : (m,) float
-        NaN where the system cannot be solved.
+        Kriging estimate and variance; NaN for a target whose system cannot be solved.
 
     Raises
     ------
     BackendError
-        The library refuses.
+        gstlearn failed.
+    MissingDependencyError
+        gstlearn is not installed.
     """
     gl = library()
     space = _space(gl)
@@ -104,7 +105,7 @@ def krige(
 def inverse_distance(offsets: Floats, values: Floats, counts: Ints, power: float) -> Floats:
     """Return means (m,) of samples weighted by a power of their inverse distance.
 
-    Parameters are those of `krige`; a sample at no distance is the answer.
+    Parameters as in `krige`. A target at a sample's position gets that sample's value.
     """
     gl = library()
     _space(gl)
@@ -120,7 +121,7 @@ def inverse_distance(offsets: Floats, values: Floats, counts: Ints, power: float
 
 
 def _space(gl: ModuleType) -> Any:
-    """Return the space of three dimensions, made the library's default where it is not."""
+    """Return the three-dimensional space, after making it the library's default."""
     if gl.getDefaultSpaceDimension() != 3:
         gl.defineDefaultSpace(gl.ESpaceType.RN, 3)
     return gl.SpaceRN.create(3)
@@ -160,7 +161,7 @@ def _batches(n: int) -> Iterator[slice]:
 def _islands(
     gl: ModuleType, offsets: Floats, values: Floats, counts: Ints, apart: float
 ) -> tuple[Any, Any]:
-    """Return tables of the samples and targets of a batch, each target on its island."""
+    """Return tables of a batch's samples and targets, each target on its island."""
     used = np.arange(offsets.shape[1]) < counts[:, None]
     centres = np.zeros((len(counts), 3))
     centres[:, 0] = apart * np.arange(len(counts))
@@ -179,7 +180,7 @@ def _table(gl: ModuleType, points: Floats, values: Floats | None) -> Any:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Keep the library's complaints off stdout: what went wrong is told by the answer."""
+    """Keep the library's messages off stdout; its return values carry the failures."""
     sys.stdout.flush()
     kept, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     try:

@@ -6,7 +6,7 @@ import igl
 import igl.predicates
 import numpy as np
 
-from geounfold.errors import BackendError
+from geounfold.backends.checks import call_libigl, finite_array
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 
@@ -66,7 +66,7 @@ class TetIndex:
         self._tree.init(self.V, self.T)
 
     def locate(self, Q: Floats) -> Ints:
-        """Return the tetrahedron holding each query point, (k,); -1 outside all."""
+        """Return the tetrahedron that holds each query point, (k,); -1 outside all."""
         return np.asarray(igl.in_element(self.V, self.T, _f(Q), self._tree), dtype=np.int64)
 
 
@@ -83,7 +83,7 @@ def barycentric_in_triangles(Q: Floats, V: Floats, F: Ints) -> Floats:
 
 
 def triangle_adjacency(F: Ints) -> Ints:
-    """Return the neighbour across each edge of each triangle, (m, 3); -1 at the boundary."""
+    """Return the neighbour across each edge of each triangle, (m, 3); -1 on the border."""
     return np.asarray(igl.triangle_triangle_adjacency(_i(F))[0], dtype=np.int64)
 
 
@@ -96,7 +96,7 @@ def face_components(F: Ints) -> Ints:
 
 
 def boundary_loops(F: Ints) -> list[Ints]:
-    """Return the boundary loops of a triangle mesh, longest (most vertices) first."""
+    """Return the border loops of a triangle mesh, the one of most vertices first."""
     loops = [np.asarray(loop, dtype=np.int64) for loop in igl.boundary_loop_all(_i(F))]
     return sorted(loops, key=len, reverse=True)
 
@@ -105,15 +105,15 @@ def upright(V: Floats, T: Ints) -> Bools:
     """Return which tetrahedra have positive volume, (m,): Shewchuk's exact predicate."""
     V = _f(V)
     a, b, c, d = (V[T[:, k]] for k in range(4))
-    sign = igl.predicates.orient3d(a, b, c, d)  # positive where d lies below, left-handed
+    sign = igl.predicates.orient3d(a, b, c, d)  # positive for a left-handed one, d below
     return np.asarray(sign).ravel() < 0
 
 
 def self_intersections(V: Floats, F: Ints) -> Ints:
-    """Return the pairs of triangles that intersect beyond what they share, (k, 2), exactly.
+    """Return the pairs of triangles that intersect, (k, 2), by exact predicates.
 
-    Neighbours that lie on top of each other count, and so does a mere touch between triangles
-    that share nothing there.
+    Shared vertices and edges do not count. Neighbours that overlap do, and so does a touch
+    between triangles that share nothing there.
     """
     _, pairs, _ = igl.predicates.find_self_intersections(_f(V), _i(F))
     return np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
@@ -125,7 +125,7 @@ def winding_number(V: Floats, F: Ints, Q: Floats) -> Floats:
 
 
 def is_manifold(F: Ints) -> bool:
-    """Return True where every edge has at most two faces and every vertex one fan of faces."""
+    """Return whether every edge has at most two faces and every vertex one fan of faces."""
     edge = igl.is_edge_manifold(_i(F))
     edge_ok = bool(np.all(edge[0] if isinstance(edge, tuple) else edge))
     return edge_ok and not len(pinched_vertices(F))
@@ -134,7 +134,7 @@ def is_manifold(F: Ints) -> bool:
 def marching_cubes(
     field: Floats, origin: Floats, step: Floats, level: float
 ) -> tuple[Floats, Ints]:
-    """Return the level surface of a regular grid as (V, F), outward where the field falls.
+    """Return the level surface on a regular grid as (V, F), facing lower values.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def marching_cubes(
 def marching_cubes_sparse(
     field: Floats, nodes: Floats, cubes: Ints, level: float
 ) -> tuple[Floats, Ints]:
-    """Return the level surface in the given cubes as (V, F), outward where the field falls.
+    """Return the level surface in the given cubes as (V, F), facing lower values.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def marching_cubes_sparse(
 
 
 def pinched_vertices(F: Ints) -> Ints:
-    """Return the vertices where two fans of triangles meet in nothing but the vertex."""
+    """Return the vertices at which two fans of triangles meet in the vertex alone."""
     manifold = igl.is_vertex_manifold(_i(F))
     flags = np.asarray(manifold[1] if isinstance(manifold, tuple) else manifold)
     return np.setdiff1d(np.flatnonzero(~flags.ravel()), np.setdiff1d(np.arange(len(flags)), F))
@@ -189,14 +189,10 @@ def lscm(V: Floats, F: Ints, fixed: Ints, uv_fixed: Floats) -> Floats:
     Raises
     ------
     BackendError
-        libigl refused, or returned something that is not finite.
+        libigl failed, or returned positions that are not finite.
     """
-    try:
-        uv, _ = igl.lscm(_f(V), _i(F), _i(fixed), _f(uv_fixed))
-    except RuntimeError as err:
-        msg = f"libigl's lscm failed: {err}"
-        raise BackendError(msg) from err
-    return _finite(np.asarray(uv, dtype=np.float64), len(V), "lscm")
+    uv, _ = call_libigl("lscm", igl.lscm, _f(V), _i(F), _i(fixed), _f(uv_fixed))
+    return finite_array(uv, (len(V), 2), "lscm")
 
 
 class ArapSteps:
@@ -214,12 +210,10 @@ class ArapSteps:
         self._data = igl.ARAPData()
         self._data.max_iter = 1
         self._n = len(V)
-        # libigl refuses an empty list of fixed vertices: vertex 0 is held at the origin.
-        try:
-            igl.arap_precomputation(_f(V), _i(F), 2, np.zeros(1, dtype=np.int32), self._data)
-        except RuntimeError as err:
-            msg = f"libigl's arap_precomputation failed: {err}"
-            raise BackendError(msg) from err
+        # libigl refuses an empty list of held vertices: vertex 0 is held at the origin.
+        held = np.zeros(1, dtype=np.int32)
+        name = "arap_precomputation"
+        call_libigl(name, igl.arap_precomputation, _f(V), _i(F), 2, held, self._data)
 
     def __call__(self, uv: Floats) -> Floats:
         """Return the positions after one step, (n, 2), vertex 0 at the origin.
@@ -227,19 +221,16 @@ class ArapSteps:
         Raises
         ------
         BackendError
-            libigl refused, or returned something that is not finite.
+            libigl failed, or returned positions that are not finite.
         """
-        try:
-            # libigl moves the held vertex alone to its place, so all are shifted with it.
-            after = igl.arap_solve(np.zeros((1, 2)), self._data, _f(uv - uv[0]))
-        except RuntimeError as err:
-            msg = f"libigl's arap_solve failed: {err}"
-            raise BackendError(msg) from err
-        return _finite(np.asarray(after, dtype=np.float64), self._n, "arap_solve")
+        # libigl moves only the held vertex to its position, so all are shifted with it first.
+        start = _f(uv - uv[0])
+        after = call_libigl("arap_solve", igl.arap_solve, np.zeros((1, 2)), self._data, start)
+        return finite_array(after, (self._n, 2), "arap_solve")
 
 
 class TetDeformation:
-    """Deformations of tetrahedra whose boundary, or any other vertices, are held in given places.
+    """Deformations of tetrahedra with some vertices, such as the border's, at given positions.
 
     Parameters
     ----------
@@ -248,76 +239,68 @@ class TetDeformation:
     T : (m, 4) int
         Right-handed tetrahedra.
     held : (k,) int
-        Vertices whose places are given.
+        Vertices whose positions are given.
     """
 
     def __init__(self, V: Floats, T: Ints, held: Ints) -> None:
         self._V, self._T, self._held = _f(V), _i(T), _i(held)
 
     def harmonic(self, places: Floats) -> Floats:
-        """Return all places (n, 3), harmonic over the rest shape, held ones at places (k, 3).
-
-        Raises
-        ------
-        BackendError
-            libigl refused, or returned something that is not finite.
-        """
-        if len(self._held) == len(self._V):
-            return self._in_order(places)
-        try:
-            out = igl.harmonic(self._V, self._T, self._held, _f(places), 1)
-        except RuntimeError as err:
-            msg = f"libigl's harmonic failed: {err}"
-            raise BackendError(msg) from err
-        return _finite(np.asarray(out, dtype=np.float64), len(self._V), "harmonic", 3)
-
-    def rigid(self, places: Floats, start: Floats, tol: float, max_iter: int) -> tuple[Floats, int]:
-        """Return all places (n, 3), as rigid as possible, and the number of local-global steps.
+        """Return all positions (n, 3), harmonic over the rest shape.
 
         Parameters
         ----------
         places : (k, 3) float
-            Of the held vertices.
+            Positions of the held vertices.
+
+        Raises
+        ------
+        BackendError
+            libigl failed, or returned positions that are not finite.
+        """
+        if len(self._held) == len(self._V):
+            return self._in_order(places)
+        given = _f(places)
+        out = call_libigl("harmonic", igl.harmonic, self._V, self._T, self._held, given, 1)
+        return finite_array(out, self._V.shape, "harmonic")
+
+    def rigid(self, places: Floats, start: Floats, tol: float, max_iter: int) -> tuple[Floats, int]:
+        """Return all positions (n, 3), as rigid as possible, and the number of local-global steps.
+
+        Parameters
+        ----------
+        places : (k, 3) float
+            Positions of the held vertices.
         start : (n, 3) float
-            All places to start from.
+            All positions to start from.
         tol : float
-            Stop where a step moves no vertex by more than this, in the vertices' unit.
+            Largest move of a vertex in the last step, in the vertices' unit.
         max_iter : int
             Largest number of steps.
 
         Raises
         ------
         BackendError
-            libigl refused, or returned something that is not finite.
+            libigl failed, or returned positions that are not finite.
         """
         if len(self._held) == len(self._V):
             return self._in_order(places), 0
         data = igl.ARAPData()
         data.max_iter = 1
-        now = _f(start)
-        try:
-            igl.arap_precomputation(self._V, self._T, 3, self._held.astype(np.int32), data)
-            for step in range(1, max_iter + 1):
-                after = np.asarray(igl.arap_solve(_f(places), data, now), dtype=np.float64)
-                _finite(after, len(self._V), "arap_solve", 3)
-                moved = float(np.abs(after - now).max())
-                now = after
-                if moved <= tol:
-                    return now, step
-        except RuntimeError as err:
-            msg = f"libigl's arap failed: {err}"
-            raise BackendError(msg) from err
+        held = self._held.astype(np.int32)
+        name = "arap_precomputation"
+        call_libigl(name, igl.arap_precomputation, self._V, self._T, 3, held, data)
+        now, given = _f(start), _f(places)
+        for step in range(1, max_iter + 1):
+            after = call_libigl("arap_solve", igl.arap_solve, given, data, now)
+            after = finite_array(after, self._V.shape, "arap_solve")
+            moved = float(np.abs(after - now).max())
+            now = after
+            if moved <= tol:
+                return now, step
         return now, max_iter
 
     def _in_order(self, places: Floats) -> Floats:
         out = np.empty_like(self._V)
         out[self._held] = places
         return out
-
-
-def _finite(uv: Floats, n: int, name: str, dim: int = 2) -> Floats:
-    """Return uv, or BackendError where it is not (n, dim) and finite (libigl issue 2439)."""
-    if uv.shape != (n, dim) or not np.isfinite(uv).all():
-        msg = f"libigl's {name} returned positions that are not finite"
-        raise BackendError(msg)
-    return uv

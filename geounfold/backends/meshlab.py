@@ -1,8 +1,8 @@
-"""MeshLab's filters: remeshing and surface reconstruction.  Plain arrays in and out.
+"""MeshLab's filters: remeshing and surface reconstruction.
 
-pymeshlab is slow to import, so it is imported on first use.  Each call names every parameter:
-one that is left out keeps the value of the filter's previous call in the process, not its
-documented default.
+pymeshlab is slow to import, so it is imported on first use. Each call names every parameter,
+because a parameter that is left out keeps its value from the filter's previous call in the process
+instead of its documented default.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from geounfold.errors import BackendError, MissingDependencyError
 from geounfold.geometry.mesh import Floats, Ints
 
-# What MeshLab says when a plugin, whose system library is missing, was left out on import.
+# MeshLab's messages after it left out a plugin on import, because a system library is missing.
 _ABSENT = ("Filter does not exists", "Unknown format")
 _CURE = "install OpenGL (Debian and Ubuntu: apt-get install libgl1 libopengl0)"
 
@@ -25,7 +25,7 @@ def _pymeshlab() -> Any:
         import pymeshlab
     except ImportError as error:
         raise MissingDependencyError(
-            f"pymeshlab cannot be loaded ({error}); pip install pymeshlab, or where it names a "
+            f"pymeshlab cannot be loaded ({error}); pip install pymeshlab, or if it names a "
             f"system library, {_CURE}"
         ) from error
     return pymeshlab
@@ -42,7 +42,7 @@ def _mesh_set(V: Floats, F: Ints | None = None, normals: Floats | None = None) -
     try:
         meshes.add_mesh(ml.Mesh(**parts))
     except ml.PyMeshLabException as error:
-        raise BackendError(f"MeshLab takes no such surface: {_one_line(error)}") from error
+        raise BackendError(f"MeshLab cannot take the surface: {_one_line(error)}") from error
     return meshes
 
 
@@ -67,7 +67,7 @@ def _arrays(meshes: Any) -> tuple[Floats, Ints]:
 
 
 def remesh(V: Floats, F: Ints, length: float, iterations: int) -> tuple[Floats, Ints]:
-    """Return an isotropic triangulation of the same surface with edges of about ``length``."""
+    """Return an isotropic triangulation of a surface with edges of about ``length``."""
     exact = _pymeshlab().PureValue
     meshes = _mesh_set(V, F)
     _apply(
@@ -90,7 +90,7 @@ def remesh(V: Floats, F: Ints, length: float, iterations: int) -> tuple[Floats, 
 
 
 def taubin(V: Floats, F: Ints, steps: int) -> Floats:
-    """Return the vertices smoothed by Taubin's shrink and swell steps, which keep the volume."""
+    """Return the vertices smoothed by Taubin's shrinking and swelling steps, at equal volume."""
     meshes = _mesh_set(V, F)
     _apply(
         meshes,
@@ -104,7 +104,7 @@ def taubin(V: Floats, F: Ints, steps: int) -> Floats:
 
 
 def ball_pivoting(points: Floats, normals: Floats, radius: float) -> tuple[Floats, Ints]:
-    """Return the triangles on which a ball of the given radius rests, with points as vertices."""
+    """Return the triangles of points on which a ball of the given radius rests."""
     meshes = _mesh_set(points, normals=normals)
     _apply(
         meshes,
@@ -139,7 +139,7 @@ def poisson(points: Floats, normals: Floats, depth: int) -> tuple[Floats, Ints]:
 
 
 def repair_manifold(V: Floats, F: Ints) -> tuple[Floats, Ints]:
-    """Remove faces at non-manifold edges, split non-manifold vertices, drop degenerate faces."""
+    """Return the surface without faces at non-manifold edges, vertices of several fans split."""
     meshes = _mesh_set(V, F)
     _apply(meshes, "meshing_remove_duplicate_faces")
     _apply(meshes, "meshing_remove_null_faces")
@@ -150,7 +150,7 @@ def repair_manifold(V: Floats, F: Ints) -> tuple[Floats, Ints]:
 
 
 def close_holes(V: Floats, F: Ints, edges: int) -> tuple[Floats, Ints]:
-    """Close holes whose border has at most the given number of edges."""
+    """Return the surface with the holes closed that have at most the given number of edges."""
     meshes = _mesh_set(V, F)
     _apply(
         meshes,
@@ -166,7 +166,7 @@ def close_holes(V: Floats, F: Ints, edges: int) -> tuple[Floats, Ints]:
 
 
 def orient_coherently(V: Floats, F: Ints) -> tuple[Floats, Ints]:
-    """Turn faces so that neighbours agree (outwards or inwards is left to the caller)."""
+    """Return the surface with faces oriented alike, all outwards or all inwards."""
     meshes = _mesh_set(V, F)
     _apply(meshes, "meshing_re_orient_faces_coherently")
     return _arrays(meshes)
@@ -175,14 +175,14 @@ def orient_coherently(V: Floats, F: Ints) -> tuple[Floats, Ints]:
 def read_mesh(path: str | PathLike[str]) -> tuple[Floats, Ints]:
     """Return vertices (n, 3) and faces (m, 3) of a mesh file, polygons cut into triangles.
 
-    The kind follows the ending; coordinates keep double precision where the file has it.
+    The file's ending selects the format. Coordinates keep double precision if the file has it.
 
     Raises
     ------
     BackendError
         The file is damaged.
     MissingDependencyError
-        The kind is unknown, as every one is where MeshLab's own library of kinds is not loaded.
+        MeshLab does not know the format. It knows none if its library of formats is not loaded.
     """
     ml = _pymeshlab()
     meshes = ml.MeshSet(verbose=False)

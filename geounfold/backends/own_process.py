@@ -1,8 +1,8 @@
-"""Libraries that may abort, print or run for hours: called in a process of its own.
+"""Calls in a process of their own, for libraries that may abort, print or run for hours.
 
-What such a call does to its process (a crash, a full memory, text on stdout) ends with that
-process and comes back as one BackendError.  Each call has a fresh process, so that what a library
-keeps between calls cannot change the answer.
+A crash or an exhausted memory ends only that process and is raised as a BackendError; text on
+stdout is dropped. Each call has a fresh process, so that no state that a library keeps between
+calls can change the answer.
 """
 
 from __future__ import annotations
@@ -32,30 +32,30 @@ _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 def call_apart(
     name: str, function: str, arguments: Mapping[str, np.ndarray | float], limit: float
 ) -> tuple[np.ndarray, ...]:
-    """Return the arrays that a function returns, called in a process of its own.
+    """Call a function in a process of its own, and return its arrays.
 
     Parameters
     ----------
     name : str
-        What the messages call the library.
+        The library's name in messages.
     function : str
         ``module:function``, whose arguments and returned tuple are arrays or numbers.
     arguments : mapping of str to array or float
-        By keyword.
+        The function's keyword arguments.
     limit : float
         Seconds of wall time after which the call is given up.
 
     Raises
     ------
     BackendError
-        The call failed, crashed, ran out of memory or took longer than the limit; the message says
-        which.
+        The call failed, crashed, ran out of memory or took longer than the limit; the message
+        names which.
     """
     request = _packed(
         {"function": np.array(function), **{f"in_{k}": v for k, v in arguments.items()}}
     )
     try:
-        with tempfile.TemporaryDirectory() as folder:  # fTetWild leaves files where it runs
+        with tempfile.TemporaryDirectory() as folder:  # fTetWild leaves files in its folder
             done = subprocess.run(
                 [sys.executable, "-P", "-c", _START],
                 input=request,
@@ -78,9 +78,11 @@ def call_apart(
 
 
 def serve() -> None:
-    """Answer one call: read it from stdin, and write the arrays, or the error, to stdout."""
+    """Read one call from stdin, run it, and write its arrays or its error to stdout."""
     with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)  # Linux: end with the caller
+        ctypes.CDLL(None).prctl(
+            _DEATH_SIGNAL, signal.SIGKILL
+        )  # Linux: this process ends with its caller
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what the library prints
     _answer(sys.stdin.buffer, answer)
@@ -102,13 +104,13 @@ def _answer(source: BinaryIO, target: BinaryIO) -> None:
 
 
 def _search_path() -> str:
-    """Return PYTHONPATH, absolute, with the folder that this very package came from in front."""
+    """Return PYTHONPATH as absolute paths, this package's own folder first."""
     given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     return os.pathsep.join([_ROOT, *(str(Path(path).resolve()) for path in given)])
 
 
 def _end(code: int, stderr: bytes) -> str:
-    """Return how a process ended that gave no answer."""
+    """Return words for how a process ended that wrote no answer."""
     if code < 0:
         return f"crashed ({signal.Signals(-code).name})"
     last = stderr.decode("utf-8", "replace").strip().splitlines()[-1:]

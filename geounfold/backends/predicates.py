@@ -1,4 +1,4 @@
-"""libigl's exact predicate in the plane: on which side of a line a point lies."""
+"""libigl's exact predicate in the plane: the side of a line on which a point lies."""
 
 from __future__ import annotations
 
@@ -7,24 +7,26 @@ import numpy as np
 
 from geounfold.geometry.mesh import Floats, Ints
 
-#: Shewchuk's bound on the rounding error of the determinant, as a share of its terms' sizes
-#: ((3 + 16 u) u with u = 2^-53): a larger value has the right sign.
 _CERTAIN = (3 + 16 * 2.0**-53) * 2.0**-53
+"""Shewchuk's bound on the determinant's rounding error, as a share of its terms' sizes.
 
-#: Least size of the terms for which the bound holds: below it products may underflow.
+It is (3 + 16 u) u with u = 2^-53. A larger determinant has the right sign.
+"""
+
 _SAFE = 1e-290
+"""Least size of the terms for which the bound holds; below it products may underflow."""
 
 
 def orientations(a: Floats, b: Floats, c: Floats) -> Ints:
     """Return the exact orientation of the triangles (a, b, c), (k,).
 
-    Floating point decides where its error bound allows that (Shewchuk 1997); libigl's adaptive
-    ``orient2d`` decides the rest, one triangle at a time.
+    Floating-point arithmetic decides if the determinant exceeds its error bound (Shewchuk 1997).
+    Otherwise libigl's adaptive ``orient2d`` decides, one triangle at a time.
 
     Parameters
     ----------
     a, b, c : (k, 2) float
-        Finite corners.
+        Corners, finite.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""libigl's flattenings that never fold: SLIM, and scaffold maps whose border stays apart."""
+"""libigl's flattenings without flipped triangles: SLIM, and scaffold maps, one-to-one as well."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from typing import Any
 import igl
 import numpy as np
 
-from geounfold.errors import BackendError
+from geounfold.backends.checks import call_libigl, finite_array
 from geounfold.geometry.mesh import Floats, Ints
 
-#: Folded area that libigl's scaffold maps are given.  They weigh the scaffold by the symmetric
-#: Dirichlet energy less 4, as if the area were 1: below that the weight can be negative, and the
-#: answer is NaN; at 1 it is zero where nothing is strained.
 _SCAFFOLD_AREA = 2.0
+"""Folded area to which surfaces are scaled for libigl's scaffold maps.
+
+libigl weighs the scaffold by the symmetric Dirichlet energy less 4, as if the area were 1. Below
+that the weight can be negative, and the answer is NaN. At 1 it is zero on an unstrained surface.
+"""
 
 
 class SlimSteps:
-    """SLIM (Rabinovich et al. 2017): steps of the symmetric Dirichlet energy without flips.
+    """SLIM (Rabinovich et al. 2017): steps that lower the symmetric Dirichlet energy.
 
     Parameters
     ----------
@@ -26,14 +28,13 @@ class SlimSteps:
     F : (m, 3) int
         Triangles.
     uv : (n, 2) float
-        Where to start: no triangle turned over.
+        Start positions without flipped triangles; no step flips one.
     """
 
     def __init__(self, V: Floats, F: Ints, uv: Floats) -> None:
         self._unit, self._n = _unit(V, F, 1.0), len(V)
-        self._data = _guarded(
-            "slim_precompute", igl.slim_precompute, *_problem(V, F, uv, self._unit), 0.0
-        )
+        problem = _problem(V, F, uv, self._unit)
+        self._data = call_libigl("slim_precompute", igl.slim_precompute, *problem, 0.0)
 
     def __call__(self) -> Floats:
         """Return the positions after one more step, (n, 2).
@@ -41,19 +42,19 @@ class SlimSteps:
         Raises
         ------
         BackendError
-            libigl refused, or returned something that is not finite.
+            libigl failed, or returned positions that are not finite.
         """
-        after = _guarded("slim_solve", igl.slim_solve, self._data, 1)
-        return _finite(after, self._n, "slim_solve") * self._unit
+        after = np.array(call_libigl("slim_solve", igl.slim_solve, self._data, 1), order="C")
+        return finite_array(after, (self._n, 2), "slim_solve") * self._unit
 
 
 class ScaffoldSteps:
-    """Scaffold maps (Jiang, Schaefer, Panozzo 2017): SLIM steps on the surface and on a mesh
-    of the plane around it and in its holes, so that neither folds and the border never meets
-    itself.
+    """Scaffold maps (Jiang, Schaefer, Panozzo 2017): SLIM steps that also keep the edge apart.
 
-    The mesh around is made by Triangle, which libigl ships in its module of restricted licence.
-    ``uv`` must be one-to-one: Triangle ends the process where it finds no triangulation.
+    The steps move the surface and a mesh of the plane around it and in its holes. Neither gets
+    flipped triangles, so the surface's border never meets itself. The mesh of the plane is made by
+    Triangle, which libigl ships in its module of restricted licence. Triangle ends the process if
+    it finds no triangulation, as on a ``uv`` that is not one-to-one.
 
     Parameters
     ----------
@@ -62,8 +63,8 @@ class ScaffoldSteps:
     F : (m, 3) int
         Triangles.
     uv : (n, 2) float
-        Where to start: one-to-one.
-    """  # noqa: D205
+        Start positions, one-to-one.
+    """
 
     def __init__(self, V: Floats, F: Ints, uv: Floats) -> None:
         import igl.triangle
@@ -71,13 +72,9 @@ class ScaffoldSteps:
         self._triangle, self._n = igl.triangle, len(V)
         self._unit = _unit(V, F, _SCAFFOLD_AREA)
         self._data = igl.triangle.SCAFData()
-        _guarded(
-            "scaf_precompute",
-            igl.triangle.scaf_precompute,
-            *_problem(V, F, uv, self._unit),
-            0.0,
-            self._data,
-        )
+        problem = _problem(V, F, uv, self._unit)
+        precompute = igl.triangle.scaf_precompute
+        call_libigl("scaf_precompute", precompute, *problem, 0.0, self._data)
 
     def __call__(self) -> Floats:
         """Return the positions after one more step, (n, 2).
@@ -85,20 +82,21 @@ class ScaffoldSteps:
         Raises
         ------
         BackendError
-            libigl refused, or returned something that is not finite.
+            libigl failed, or returned positions that are not finite.
         """
-        after = _guarded("scaf_solve", self._triangle.scaf_solve, 1, self._data)
-        return _finite(after[: self._n, :2], self._n, "scaf_solve") * self._unit
+        after = call_libigl("scaf_solve", self._triangle.scaf_solve, 1, self._data)
+        after = np.array(after[: self._n, :2], order="C")
+        return finite_array(after, (self._n, 2), "scaf_solve") * self._unit
 
 
 def _unit(V: Floats, F: Ints, area: float) -> float:
-    """Return the length that gives the triangles the given area when it is taken for one."""
+    """Return the unit of length in which the triangles have the given area."""
     normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
     return float(np.sqrt(np.linalg.norm(normals, axis=1).sum() / 2 / area))
 
 
 def _problem(V: Floats, F: Ints, uv: Floats, unit: float) -> tuple[Any, ...]:
-    """Return the arguments that both take: no vertex is held."""
+    """Return the arguments that SLIM and scaffold maps share; no vertex is held."""
     return (
         np.asfortranarray((V - V.mean(axis=0)) / unit, dtype=np.float64),
         np.asfortranarray(F, dtype=np.int32),
@@ -109,26 +107,8 @@ def _problem(V: Floats, F: Ints, uv: Floats, unit: float) -> tuple[Any, ...]:
     )
 
 
-def _guarded(name: str, function: Any, *arguments: Any) -> Any:
-    """Return what a function of libigl returns, its refusal renamed."""
-    try:
-        return function(*arguments)
-    except RuntimeError as err:
-        msg = f"libigl's {name} failed: {err}"
-        raise BackendError(msg) from err
-
-
-def _finite(uv: Any, n: int, name: str) -> Floats:
-    """Return a copy of uv, or BackendError where it is not (n, 2) and finite."""
-    out = np.array(uv, dtype=np.float64, order="C")
-    if out.shape != (n, 2) or not np.isfinite(out).all():
-        msg = f"libigl's {name} returned positions that are not finite"
-        raise BackendError(msg)
-    return out
-
-
 class SlimTets:
-    """SLIM on tetrahedra: steps of the symmetric Dirichlet energy that invert none.
+    """SLIM on tetrahedra: steps that lower the symmetric Dirichlet energy and invert none.
 
     Parameters
     ----------
@@ -145,25 +125,25 @@ class SlimTets:
         self._V = np.asfortranarray((V - V.mean(axis=0)) / self._unit, dtype=np.float64)
 
     def __call__(self, V: Floats, held: Ints, wanted: Floats, weight: float) -> Floats:
-        """Return the places after one step from V (n, 3), (n, 3).
+        """Return the vertices after one step, (n, 3).
 
         Parameters
         ----------
         V : (n, 3) float
-            Where to start: no tetrahedron inverted.
+            Vertices before the step, no tetrahedron inverted.
         held : (k,) int
-            Vertices that are drawn somewhere.
+            Vertices that are pulled to given positions.
         wanted : (k, 3) float
-            Where to.
+            Those positions.
         weight : float
-            Of their mean square distance from there against the mean energy.
+            Weight of their mean square distance from there, relative to the mean energy.
 
         Raises
         ------
         BackendError
-            libigl refused, or returned something that is not finite.
+            libigl failed, or returned positions that are not finite.
         """
-        data = _guarded(
+        data = call_libigl(
             "slim_precompute",
             igl.slim_precompute,
             self._V,
@@ -174,8 +154,5 @@ class SlimTets:
             np.asfortranarray(wanted / self._unit, dtype=np.float64),
             weight * self._unit**2 / len(held),
         )
-        after = np.array(_guarded("slim_solve", igl.slim_solve, data, 1), order="C")
-        if after.shape != self._V.shape or not np.isfinite(after).all():
-            msg = "libigl's slim_solve returned positions that are not finite"
-            raise BackendError(msg)
-        return after * self._unit
+        after = np.array(call_libigl("slim_solve", igl.slim_solve, data, 1), order="C")
+        return finite_array(after, self._V.shape, "slim_solve") * self._unit

@@ -1,7 +1,7 @@
 """TetGen (Si 2015): constrained Delaunay tetrahedra over a surface's own triangles.
 
-TetGen is AGPL and no dependency: the extra ``tetgen`` brings it.  Imported on first use, in a
-process of its own (see `apart`).
+TetGen's licence is AGPL, so it is no dependency: the extra ``tetgen`` installs it. It is imported
+on first use, in a process of its own (see `own_process`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ def tetrahedralize(V: Floats, F: Ints, edge: float, ratio: float = 1.5) -> tuple
     F : (m, 3) int
         Triangles, outward.
     edge : float
-        Tetrahedra inside are no larger than regular ones with edges of this length.
+        Length of edges in the vertices' unit; no tetrahedron is larger than a regular one of it.
     ratio : float, optional
-        Largest ratio of circumradius to shortest edge that is aimed at inside.
+        Largest ratio of circumradius to shortest edge that TetGen aims at.
     """
     import tetgen
 

@@ -1,7 +1,7 @@
 """fTetWild (Hu et al. 2020, arXiv 1908.03581): tetrahedra within an envelope of a surface.
 
-It draws random numbers that cannot be seeded, so two runs give different meshes.  Imported on first
-use, in a process of its own (see `apart`).
+It draws random numbers that cannot be seeded, so two runs give different meshes. It is imported on
+first use, in a process of its own (see `own_process`).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ def tetrahedralize(V: Floats, F: Ints, edge: float, envelope: float) -> tuple[Fl
     F : (m, 3) int
         Triangles, outward.
     edge : float
-        Length of edges aimed at, in the vertices' unit.
+        Length of edges that fTetWild aims at, in the vertices' unit.
     envelope : float
-        How far the tetrahedra's border may lie from the surface, same unit.
+        Largest distance between the tetrahedra's border and the surface, in the same unit.
     """
     import pytetwild
 
     size = float(np.linalg.norm(np.ptp(V, axis=0)))
-    # The surface is evenly triangulated already: simplifying it takes longer than all the rest.
+    # The surface is evenly triangulated already, and simplifying takes longer than all the rest.
     vertices, T = pytetwild.tetrahedralize(
         np.ascontiguousarray(V, dtype=np.float64),
         np.ascontiguousarray(F, dtype=np.int32),

@@ -1,7 +1,7 @@
-"""Work on slices of arrays, by all cores.
+"""Work on slices of arrays by all cores.
 
-NumPy's loops run without Python's lock, so that threads share them.  Slices have a fixed size
-and no slice knows of the others: what comes out is the same whatever the number of cores.
+NumPy's loops run without Python's lock, so threads run at the same time. Slices have a fixed size
+and do not depend on each other, so the answer is the same for every number of cores.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 def memory_is_limited() -> bool:
-    """Return whether the process may not take all the memory there is (``ulimit -v``)."""
+    """Return whether the process's memory is limited (``ulimit -v``)."""
     if sys.platform == "win32":
         return False
     import resource
@@ -27,7 +27,8 @@ def memory_is_limited() -> bool:
 def cores() -> int:
     """Return how many cores this process may use.
 
-    One where its memory is limited: Python waits for ever for a thread that finds none to start.
+    If its memory is limited, one: Python waits for ever for a thread that finds no memory to
+    start.
     """
     if memory_is_limited():
         return 1
@@ -52,9 +53,9 @@ def over_slices(work: Callable[[slice], T], count: int, size: int) -> list[T]:
     Parameters
     ----------
     work : callable
-        Called with one slice; may write that slice of arrays, and nothing else.
+        Called with one slice. It may write that slice of arrays and nothing else.
     count, size : int
-        Rows in all, and of a slice.
+        Number of rows in all, and of a slice.
 
     Examples
     --------

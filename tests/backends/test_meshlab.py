@@ -70,5 +70,5 @@ def test_an_absent_pymeshlab_is_named(monkeypatch):
 
 
 def test_a_surface_without_vertices_is_refused():
-    with pytest.raises(BackendError, match="takes no such surface"):
+    with pytest.raises(BackendError, match="MeshLab cannot take the surface"):
         meshlab.taubin(np.empty((0, 3)), np.empty((0, 3), np.int64), 1)

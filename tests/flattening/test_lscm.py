@@ -33,7 +33,7 @@ def test_lscm_tries_a_second_pair_of_pins_and_says_so(monkeypatch):
     def fails_once(V, F, fixed, uv_fixed):
         calls.append(fixed)
         if len(calls) == 1:
-            raise BackendError("libigl's lscm returned positions that are not finite")
+            raise BackendError("libigl's lscm returned values that are not finite")
         return true(V, F, fixed, uv_fixed)
 
     monkeypatch.setattr(backend, "lscm", fails_once)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from geounfold.backends import igl as igl_backend
 from geounfold.backends import slim_scaf
+from geounfold.backends.checks import finite_array
 from geounfold.backends.predicates import orientations
 from geounfold.errors import FlatteningError
 from geounfold.flattening import FLATTENERS, _repair, flatten, tutte
@@ -242,7 +243,7 @@ def test_given_rest_lengths_are_not_replaced_by_the_meshs_own():
 def test_scaffold_maps_that_fail_are_an_error(monkeypatch):
     nan = np.full((len(ramp()[0]), 2), np.nan)
     steps = slim_scaf.ScaffoldSteps
-    monkeypatch.setattr(steps, "__call__", lambda self: slim_scaf._finite(nan, len(nan), "scaf"))
+    monkeypatch.setattr(steps, "__call__", lambda self: finite_array(nan, nan.shape, "scaf"))
     with pytest.raises(FlatteningError, match=r"scaf: .*not finite"):
         flatten(ramp(), "scaf")
 

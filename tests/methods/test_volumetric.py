@@ -59,7 +59,7 @@ def test_volumetric_names_libigls_failure(monkeypatch, plunging):
             pass
 
         def __call__(self, *_):
-            raise volumetric.BackendError("libigl's slim_solve returned positions not finite")
+            raise volumetric.BackendError("libigl's slim_solve returned values that are not finite")
 
     monkeypatch.setattr(volumetric, "SlimTets", Broken)
     with pytest.raises(FlatteningError, match="volumetric: libigl's slim_solve"):

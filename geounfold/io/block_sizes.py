@@ -1,4 +1,4 @@
-"""The sides of a table's blocks: in columns found by name, given, or measured."""
+"""The sides of a table's blocks: from columns, from an option, or from the centroids' lattice."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from geounfold.io.messages import listing
 
 
 def size_columns(names: Sequence[str]) -> Triple | None:
-    """Return the names of the three columns of sides, or None where there are none.
+    """Return the names of the three columns of block sides; None if there are no such columns.
 
     Raises
     ------
@@ -50,17 +50,18 @@ def size_columns(names: Sequence[str]) -> Triple | None:
 
 @dataclass(frozen=True)
 class Sides:
-    """Where a table's blocks have their sides: in three columns, or the same for all.
+    """The sides of a table's blocks, from three columns or the same for all blocks.
 
     Attributes
     ----------
     given : three str or three float
+        Column names, or lengths in the unit of the coordinates.
     """
 
     given: Triple | tuple[float, float, float]
 
     def of(self, frame: pd.DataFrame) -> Floats:
-        """Return the sides (n, 3) of a table's rows; NaN where they are no positive numbers."""
+        """Return the sides (n, 3) of a table's rows; NaN if they are not positive numbers."""
         if isinstance(self.given[0], str):
             read = [readable_numbers(frame[name])[0] for name in self.given]
             sides = np.column_stack(read)
@@ -87,18 +88,18 @@ def block_model(
     centroids : (n, 3) float
         Its coordinates.
     sizes : three names or numbers, optional
-        Columns of sides, or the sides of all blocks.  Without them, columns are found by name
-        (XINC, dx, x_size ...), else the sides are the steps of the centroids' lattice.
+        Columns of sides, or the sides of all blocks. By default columns are found by name (XINC,
+        dx, x_size ...); without such columns the sides are the steps of the centroids' lattice.
     axes : (3, 3) float, optional
-        The model's own axes as rows; without them those of the centroids' lattice, or where
-        there is none the world's.
+        The model's own axes as rows. By default those of the centroids' lattice, or the world's
+        if the centroids have no lattice.
     source : str
-        Begins the messages.
+        The file's name, with which messages begin.
 
     Raises
     ------
     InputError
-        No sides to be found, or ones that are not positive numbers.
+        No sides are found, or some are not positive numbers.
     """
     lattice = None if axes is not None and sizes is not None else measure_lattice(centroids)
     if axes is None:
@@ -120,6 +121,6 @@ def block_model(
     else:
         raise InputError(
             f"{source}: no columns of block sides (such as XINC, YINC, ZINC or dx, dy, dz) and no "
-            "lattice that would show them; give --sizes"
+            "lattice to measure them from; give --sizes"
         )
     return BlockModel(centroids, sides, axes)

@@ -1,4 +1,4 @@
-"""Values of table columns as they are written and read back."""
+"""Values of table columns: as Python objects, and the types that text values can take."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def objects(column: pd.Series) -> np.ndarray:
 
 
 def unique_names(names: Iterable[object]) -> list[str]:
-    """Return names as text, numbered where they are there already.
+    """Return names as text; a name that is there already gets a number.
 
     Examples
     --------
@@ -40,14 +40,16 @@ def unique_names(names: Iterable[object]) -> list[str]:
 
 @dataclass(frozen=True)
 class TextKind:
-    """What the texts of a column show.
+    """The type that a column of text can be converted to without loss.
 
     Attributes
     ----------
     filled : bool
-        Whether any is not blank.
-    whole, real : bool
-        Whether all that are not blank are integers, or floats, that lose nothing as numbers.
+        Whether any text is not blank.
+    whole : bool
+        Whether every text that is not blank is an integer of 18 digits or fewer.
+    real : bool
+        Whether every text that is not blank is a float of 15 integer digits or fewer.
     """
 
     filled: bool
@@ -56,7 +58,7 @@ class TextKind:
 
     @classmethod
     def of(cls, column: pd.Series) -> TextKind:
-        """Return what a column of text shows."""
+        """Return the kind of a column of text."""
         words = _words(column)
         filled = words[words != ""]
         whole, fraction = r"(?:0|[1-9]\d{0,14})", r"(?:[eE][+-]?\d+)?"
@@ -67,13 +69,13 @@ class TextKind:
         )
 
     def joined(self, other: TextKind) -> TextKind:
-        """Return what the texts of both show."""
+        """Return the kind of both columns' texts together."""
         return TextKind(
             self.filled or other.filled, self.whole and other.whole, self.real and other.real
         )
 
     def typed(self, column: pd.Series) -> pd.Series:
-        """Return text as integers or floats where that loses nothing, blanks as missing."""
+        """Return text as integers or floats if that loses nothing, blanks as missing values."""
         if not self.filled or not (self.whole or self.real):
             return column
         words = _words(column)
@@ -91,5 +93,5 @@ def _words(column: pd.Series) -> pd.Series:
 
 
 def typed_values(column: pd.Series) -> pd.Series:
-    """Return text as integers or floats where that loses nothing, blanks as missing."""
+    """Return text as integers or floats if that loses nothing, blanks as missing values."""
     return TextKind.of(column).typed(column)

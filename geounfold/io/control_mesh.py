@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 def write_control(path: str | Path, mapping: UnfoldingMap, certificate: Certificate) -> None:
     """Write a map's control mesh and the shell around it as a .vtu file.
 
-    Points are folded, in the data's coordinates; ``unfolded`` holds where each comes to lie and
-    ``stratigraphic`` its coordinate.  Cells tell whether they are of the ``body`` (1) or of the
-    shell (0), and which are at ``fault`` (1) where the map is not proved one-to-one, with the
-    ``blocks`` that those hold.
+    Points are folded, in the data's coordinates. Point data are ``unfolded``, the position in the
+    flat space, and ``stratigraphic``. Cell data are ``body``, 1 in the control mesh and 0 in the
+    shell; ``fault``, 1 for cells in which the map is not proved one-to-one; and
+    ``blocks_at_fault``, the number of blocks in those cells.
 
     Parameters
     ----------
     path : path
-        Ends in .vtu.
+        A file ending in .vtu.
     mapping : UnfoldingMap
         The map.
     certificate : Certificate
-        Of this map.
+        The map's certificate.
     """
     whole, frame = mapping.whole, mapping.frame
     T = whole.folded.T

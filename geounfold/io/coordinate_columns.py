@@ -1,4 +1,4 @@
-"""Which columns hold the coordinates, and their values as numbers."""
+"""The columns of coordinates, found by name, and column values as numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from geounfold.io.messages import counted, listing, shown
 Triple = tuple[str, str, str]
 
 
-# Spelled without case, spaces, underscores and units: "X_Centre (m)" is xcentre.
+# As plain_name returns them: "X_Centre (m)" is xcentre.
 _PATTERNS = (
     "centroid{}",
     "{}centroid",
@@ -59,7 +59,7 @@ _SIDES: tuple[Triple, ...] = tuple(
 )
 
 
-# Looked for only where none of the above is complete: x, y, z beside elevation is no question.
+# Tried only if none of the above is complete, so x, y, z beside elevation is not ambiguous.
 _MIXED: tuple[Triple, ...] = tuple(
     (a, b, c)
     for a, b in (("easting", "northing"), ("east", "north"), ("x", "y"), ("e", "n"))
@@ -84,7 +84,7 @@ def plain_name(name: object) -> str:
 
 
 def side_families(names: Sequence[str]) -> list[Triple]:
-    """Return the sets of columns that may be blocks' sides, by their `plain_name`.
+    """Return the sets of column names that may be blocks' sides, as `plain_name` returns them.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def parse_columns(text: str) -> Triple:
     Raises
     ------
     OptionError
-        When these are not three different names.
+        The text does not hold three different names.
     """
     names = [name.strip() for name in next(csv.reader([text], skipinitialspace=True), [])]
     if len(names) != 3 or len(set(names)) != 3 or not all(names):
@@ -125,17 +125,17 @@ def coordinate_columns(
     names : sequence of str
         The table's column names.
     columns : three str, optional
-        Their names. Without them: centroid_x/y/z, x/y/z, XC/YC/ZC, xcentre/ycentre/zcentre,
+        Their names. By default centroid_x/y/z, x/y/z, XC/YC/ZC, xcentre/ycentre/zcentre,
         easting/northing/elevation and the like, in any letter case; world_x/y/z before any other.
     source : str, optional
-        Begins the messages: the file's name.
+        The file's name, with which messages begin.
     own : bool, optional
-        A block model's own coordinates are wanted: world_x/y/z are passed over.
+        True to find a block model's own coordinates: world_x/y/z are passed over.
 
     Raises
     ------
     InputError
-        No complete set, more than one, or a name that is there twice.
+        No complete set of names, more than one, or a name of two columns.
 
     Examples
     --------
@@ -174,7 +174,7 @@ def _all_numbers(names: Sequence[str]) -> bool:
 
 
 def _position(names: Sequence[str], wanted: str, source: str) -> int:
-    """Return where a named column is: the exact name first, else in any letter case."""
+    """Return the position of a named column: by its exact name, else in any letter case."""
     for same in (str.__eq__, lambda a, b: a.strip().casefold() == b.strip().casefold()):
         found = [i for i, name in enumerate(names) if same(str(name), wanted)]
         if len(found) > 1:
@@ -190,7 +190,7 @@ def _position(names: Sequence[str], wanted: str, source: str) -> int:
 def _only(
     found: list[Triple], names: Sequence[str], plain: list[str], source: str
 ) -> tuple[int, int, int]:
-    """Return the one set found, or an error naming all candidates."""
+    """Return the positions of the one set found; raise an error that names the sets if several."""
     if len(found) > 1:
         sets = " and ".join(
             "/".join(shown(names[plain.index(axis)]) for axis in family) for family in found
@@ -200,7 +200,7 @@ def _only(
         twice = [names[i] for i, name in enumerate(plain) if name == axis]
         if len(twice) > 1:
             raise InputError(
-                f"{source}: ambiguous coordinate columns, several are called alike: "
+                f"{source}: ambiguous coordinate columns, several have the same name: "
                 f"{listing(twice)}; choose by --columns, or rename all but one"
             )
     a, b, c = (plain.index(axis) for axis in found[0])
@@ -213,7 +213,7 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
     Raises
     ------
     InputError
-        A value is not a number: the first one is named with its row.
+        A value is not a number; the message names the first one and its row.
     """
     name = shown(column.name)
     if _has_other_type(column):
@@ -231,9 +231,9 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
 
 
 def readable_numbers(column: pd.Series) -> tuple[Floats, Bools]:
-    """Return a column's values, (n,) float, and which of them are there but no numbers, (n,) bool.
+    """Return a column's values, (n,) float, and a mask of those that are not numbers, (n,) bool.
 
-    Both these and missing ones are NaN.
+    Missing values are NaN and not in the mask; values that are not numbers are NaN too.
     """
     kind = column.dtype
     if _has_other_type(column):
@@ -246,7 +246,7 @@ def readable_numbers(column: pd.Series) -> tuple[Floats, Bools]:
         values = text.astype(np.float64)
     except (TypeError, ValueError):
         return _with_gaps(text)
-    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000, no other tool does
+    if "_" in "".join(map(str, text)):  # Python reads 1_000 as 1000; no other tool does
         return _with_gaps(text)
     return np.asarray(values, dtype=np.float64), np.zeros(len(column), dtype=bool)
 
@@ -257,7 +257,7 @@ def _has_other_type(column: pd.Series) -> bool:
 
 
 def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
-    """Return numbers where some values are missing or no numbers, and which are the latter."""
+    """Return the numbers among texts, (n,), NaN for others, and a mask of those not missing."""
     words = pd.Series([str(value).strip() for value in text], dtype=object)
     missing = words.str.casefold().isin(_MISSING).to_numpy()
     good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
@@ -267,7 +267,7 @@ def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
 
 
 def _hint(word: str) -> str:
-    """Return what to do about a number in another country's notation."""
+    """Return the remedy for a number with a decimal comma or thousands separators, else nothing."""
     if "," in word and _DECIMAL_COMMA.fullmatch(word):
         return "; write decimals with a point, not a comma"
     if re.fullmatch(r"[+-]?\d{1,3}(?:[, '\u00a0\u2009\u202f]\d{3})+(?:\.\d+)?", word):

@@ -10,17 +10,17 @@ import numpy as np
 
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:
-    """Write figures as JSON; what is not finite becomes null, as JSON has no word for it."""
+    """Write figures as a JSON file; NaN and infinity, which JSON lacks, become null."""
     Path(path).write_text(json_text(content), encoding="utf-8")
 
 
 def json_text(content: dict[str, Any]) -> str:
-    """Return figures as one JSON object; what is not finite is null."""
+    """Return figures as the text of one JSON object; NaN and infinity become null."""
     return json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any) -> Any:
-    """Return a value in JSON's own types."""
+    """Return a value in JSON's own types; a type that JSON does not have becomes text."""
     if isinstance(value, dict):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):

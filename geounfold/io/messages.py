@@ -1,4 +1,4 @@
-"""Words for messages: one line each, whatever the file holds."""
+"""Parts of messages, kept to one printable line whatever a file holds."""
 
 from __future__ import annotations
 

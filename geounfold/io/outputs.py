@@ -1,7 +1,7 @@
-"""Outputs that appear whole or not at all, and never in place of what must be kept.
+"""Output files that appear whole or not at all, and replace files only if that is allowed.
 
-All outputs of a run are checked before anything is computed. They are written into a hidden
-folder beside each target and moved in place together once every one is complete.
+All outputs of a run are checked before anything is computed. Each is written into a hidden folder
+beside its target. They are moved in place together when all are complete.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from geounfold.io.paths import ending
 
 
 class Watcher(Protocol):
-    """Hears how far the writing is."""
+    """Is called as outputs are written, so that an interrupted run leaves nothing behind."""
 
     def part(self, path: Path) -> None:
-        """Hear that something is made at `path` that must not stay there."""
+        """Take note of a temporary file or folder that is about to be made."""
 
     def committing(self) -> AbstractContextManager[None]:
-        """Return what surrounds the moment when outputs are moved in place."""
+        """Return the context in which outputs are moved in place."""
 
 
-class _Deaf:
-    """Does not listen."""
+class _NoWatcher:
+    """Does nothing."""
 
     def part(self, path: Path) -> None: ...
 
@@ -48,16 +48,16 @@ class Outputs:
     Attributes
     ----------
     paths : dict of Path
-        Absolute targets by the name of the option that asked for each.
+        Absolute targets, by the name of each one's option.
     overwrite : bool
         Whether existing files may be replaced.
     watcher : Watcher
-        Who hears of the parts of outputs and of the moment when they are moved in place.
+        Is called as outputs are written and moved in place.
     """
 
     paths: Mapping[str, Path]
     overwrite: bool = False
-    watcher: Watcher = field(default_factory=_Deaf)
+    watcher: Watcher = field(default_factory=_NoWatcher)
 
     @classmethod
     def planned(
@@ -68,26 +68,26 @@ class Outputs:
         overwrite: bool = False,
         watcher: Watcher | None = None,
     ) -> Outputs:
-        """Return the outputs of a run after checking all of them; nothing is left on disk.
+        """Return the outputs of a run after checking all of them; nothing stays on disk.
 
         Parameters
         ----------
         wanted : dict of (path or None, valid endings)
-            By the name of the option; None for an output that is not asked for, no endings for
-            one that may have any.
+            Outputs by the name of the option. The path is None for an output that is not wanted;
+            an empty tuple allows any ending.
         inputs : paths, optional
-            The run's inputs, none of which may be an output.
+            The run's inputs, none of which may be an output too.
         overwrite : bool, optional
             Whether existing files may be replaced.
         watcher : Watcher, optional
-            Who is to hear of the writing.
+            Is called as outputs are written.
 
         Raises
         ------
         OutputError
-            A folder is missing or cannot be written, a file exists already and may not be
-            replaced, a target is a directory, an input, or asked for twice, or has an
-            unknown ending.
+            A folder is missing or cannot be written; a file exists already and may not be
+            replaced; or a target is a directory, an input or another output, or has an unknown
+            ending.
         """
         targets = {
             name: _target(name, Path(path), endings)
@@ -102,22 +102,22 @@ class Outputs:
             if any(_same(target, source) for source in sources):
                 raise OutputError(f"{target}: {name} is also an input; choose another file")
             _check_replaceable(target, overwrite)
-        watcher = watcher or _Deaf()
+        watcher = watcher or _NoWatcher()
         for folder in sorted({target.parent for target in targets.values()}):
             _check_writable(folder, watcher)
         return cls(targets, overwrite, watcher)
 
     @contextmanager
     def writing(self) -> Iterator[dict[str, Path]]:
-        """Yield a path to write each output to; on leaving, all of them appear, or none.
+        """Yield a path to write each output to; when the block ends, all of them appear, or none.
 
-        Whatever ends the block early (an error, an interrupt) leaves every target as it was.
+        If an error or an interrupt ends the block early, every target stays as it was.
 
         Raises
         ------
         OutputError
-            The disk is full, a folder has gone, or a target has appeared meanwhile and may not
-            be replaced.
+            The disk is full, a folder is gone, or a target has appeared meanwhile and may not be
+            replaced.
         """
         folders: dict[Path, Path] = {}
         try:
@@ -139,7 +139,7 @@ class Outputs:
                 shutil.rmtree(part_folder, ignore_errors=True)
 
     def _publish(self, parts: Mapping[str, Path]) -> None:
-        """Move all complete files in place; put everything back when one cannot be."""
+        """Move all complete files in place; if one cannot be moved, put all targets back."""
         undo: list[Callable[[], object]] = []
         try:
             for name, part in parts.items():
@@ -163,7 +163,7 @@ class Outputs:
 
 @contextmanager
 def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
-    """Yield a path to write to; the file appears at `path` once the block has ended well.
+    """Yield a path to write to; the file appears at `path` when the block ends without an error.
 
     Raises
     ------
@@ -179,15 +179,15 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
 def whole_folder(
     path: str | Path, *, overwrite: bool = False, watcher: Watcher | None = None
 ) -> Iterator[Path]:
-    """Yield a folder to write into; it appears at `path` once the block has ended well.
+    """Yield a folder to write into; it appears at `path` when the block ends without an error.
 
     Raises
     ------
     OutputError
-        Something is at `path` that may not be replaced or is no folder, or the folder around it
-        is missing or cannot be written.
+        `path` exists and may not be replaced or is not a folder, or its parent folder is missing
+        or cannot be written.
     """
-    target, watcher = Path(path).absolute(), watcher or _Deaf()
+    target, watcher = Path(path).absolute(), watcher or _NoWatcher()
     _check_folder(target, overwrite)
     _check_writable(target.parent, watcher)
     part = _part_of(target.parent)
@@ -216,7 +216,7 @@ def whole_folder(
 
 
 def _check_folder(target: Path, overwrite: bool) -> None:
-    """Raise where a folder cannot take this place."""
+    """Raise OutputError if a folder cannot be written at a path."""
     if not os.path.lexists(target):
         return
     if target.is_symlink() or not target.is_dir():
@@ -226,12 +226,12 @@ def _check_folder(target: Path, overwrite: bool) -> None:
 
 
 def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
-    """Return where a link leads, with a valid ending."""
+    """Return the path that links lead to, after checking its ending."""
     try:
         target = path.resolve()
         is_folder = target.is_dir()
     except (OSError, ValueError, RuntimeError) as error:
-        raise OutputError(f"{name}: '{shown(path)}' is no path: {error}") from error
+        raise OutputError(f"{name}: '{shown(path)}' is not a valid path: {error}") from error
     if is_folder:
         raise OutputError(f"{path}: {name} is a directory, not a file")
     if endings and ending(path) not in endings:
@@ -240,15 +240,15 @@ def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
 
 
 def _same(a: Path, b: Path) -> bool:
-    """Return whether two paths lead to one file (hard links included)."""
+    """Return whether two paths lead to one file, hard links included."""
     try:
         return a.resolve() == b.resolve() or a.samefile(b)
-    except (OSError, ValueError, RuntimeError):  # the second is missing or no path at all
+    except (OSError, ValueError, RuntimeError):  # the second is missing or not a valid path
         return False
 
 
 def _check_replaceable(target: Path, overwrite: bool) -> None:
-    """Raise where a target is there already and may not be replaced."""
+    """Raise OutputError if a target exists and may not be replaced."""
     if not os.path.lexists(target):
         return
     if not target.is_file():
@@ -258,12 +258,12 @@ def _check_replaceable(target: Path, overwrite: bool) -> None:
 
 
 def _part_of(folder: Path) -> Path:
-    """Return a name in a folder for what is not yet an output."""
+    """Return a new path in a folder for what is not complete yet."""
     return folder / f".geounfold-{uuid.uuid4().hex}.part"
 
 
 def _check_writable(folder: Path, watcher: Watcher) -> None:
-    """Raise where no file can be made in a folder, by making one."""
+    """Raise OutputError if nothing can be made in a folder, which is tried."""
     if not folder.exists():
         raise OutputError(f"{folder}: no such folder; make it first")
     if not folder.is_dir():
@@ -283,7 +283,7 @@ def _check_writable(folder: Path, watcher: Watcher) -> None:
 
 @contextmanager
 def _as_output_error(targets: Iterable[Path]) -> Iterator[None]:
-    """Turn the system's refusals to write into one line."""
+    """Raise OutputError, in one line, for the system's errors while writing."""
     try:
         yield
     except OSError as error:
@@ -296,19 +296,19 @@ def _as_output_error(targets: Iterable[Path]) -> Iterator[None]:
 
 
 def _flush(path: Path) -> None:
-    """Bring a file or folder onto the disk."""
+    """Write a file's or folder's cached data to the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # no such thing on this file system
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # the file system has no such call
             raise
     finally:
         os.close(handle)
 
 
 def _keep(target: Path, old: Path) -> None:
-    """Keep a file under a second name until its successor is in place."""
+    """Keep a file under a second name until its replacement is in place."""
     try:
         os.link(target, old)
     except OSError:  # a file system without hard links
@@ -316,18 +316,19 @@ def _keep(target: Path, old: Path) -> None:
 
 
 def _move_new(part: Path, target: Path) -> None:
-    """Move a file in place unless something is there, with no moment between look and move."""
+    """Move a file in place unless the target exists, checked and moved in one step."""
     try:
         os.link(part, target)
     except FileExistsError as error:
         raise OutputError(
             f"{target}: the file has appeared meanwhile; --overwrite replaces it"
         ) from error
-    except OSError:  # a file system without hard links: claim the name, then replace it
+    except OSError:  # a file system without hard links
         _claim(part, target)
 
 
 def _claim(part: Path, target: Path) -> None:
+    """Make the target as an empty file, unless it exists, and then replace that."""
     try:
         os.close(os.open(target, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
     except FileExistsError as error:

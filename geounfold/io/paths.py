@@ -1,4 +1,4 @@
-"""Paths of files: their endings, and whether they are there."""
+"""Paths of files: their endings, and the check that a file can be read."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def existing_file(path: Path) -> Path:
         if not path.exists():
             raise InputError(f"{path}: no such file")
         if not path.is_file():
-            raise InputError(f"{path}: is a pipe or a device; save what it holds to a file first")
+            raise InputError(f"{path}: is a pipe or a device; save its content to a file first")
         with path.open("rb") as stream:
             if not stream.read(1):
                 raise InputError(f"{path}: the file is empty")

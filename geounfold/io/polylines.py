@@ -1,4 +1,4 @@
-"""Lines in space, as VTK poly data."""
+"""Polylines as VTK files."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ def write_polylines(
     point_data: Mapping[str, np.ndarray],
     line_data: Mapping[str, Sequence[str]],
 ) -> None:
-    """Write lines to a ``.vtp`` file, floats bit for bit.
+    """Write polylines to a ``.vtp`` file, floats bit for bit.
 
     Parameters
     ----------
     path : path
-        Ends in .vtp.
+        A file ending in .vtp.
     points : (n, 3) float
-        Vertices, line after line.
+        Vertices, one line after the other.
     first : (k + 1,) int
         Line k has the vertices ``first[k]`` to ``first[k + 1] - 1``.
     point_data : dict of (n,) or (n, 3) arrays
         Values at the vertices.
     line_data : dict of k texts
-        Words for each line.
+        A text for each line.
     """
     import pyvista
 

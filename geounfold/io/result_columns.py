@@ -1,4 +1,4 @@
-"""The columns that a result is told in."""
+"""The columns of a result: unfolded or folded coordinates, stratigraphic coordinate, location."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ WORLD: Triple = ("world_x", "world_y", "world_z")
 
 
 def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
-    """Return where points came to lie, by output column, (n,) each.
+    """Return the result for carried points by output column, (n,) each.
 
-    ``stratigraphic`` is left out on the way back to the folded space.
+    A result in the folded space has no ``stratigraphic``.
     """
     points = {name: carried.points[:, axis] for axis, name in enumerate(names)}
     height = {} if names == FOLDED else {"stratigraphic": carried.stratigraphic}
@@ -35,17 +35,17 @@ def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
 
 
 def world_columns(points: Floats) -> dict[str, Any]:
-    """Return the world coordinates of points (n, 3) read in a model's own, by output column."""
+    """Return world coordinates (n, 3) by output column, for a file in a model's own coordinates."""
     return {name: points[:, axis] for axis, name in enumerate(WORLD)}
 
 
 def frame_points(frame: pd.DataFrame, prefer: Triple | None = None) -> Floats:
-    """Return the coordinates in a DataFrame, (n, 3); those called as `prefer` where they exist.
+    """Return the coordinates in a DataFrame, (n, 3), from the columns `prefer` if they exist.
 
     Raises
     ------
     InputError
-        No coordinate columns, several sets of them, or values that are no numbers.
+        No coordinate columns, several sets of them, or values that are not numbers.
     """
     names = [str(name) for name in frame.columns]
     there = prefer if prefer is not None and set(prefer) <= set(names) else None
@@ -56,10 +56,10 @@ def frame_points(frame: pd.DataFrame, prefer: Triple | None = None) -> Floats:
 def with_carried(
     frame: pd.DataFrame, carry: Callable[[Floats], Carried], names: Triple
 ) -> pd.DataFrame:
-    """Return a DataFrame with where its points came to lie: index, columns and types are kept.
+    """Return a DataFrame with the result for its points; index, columns and types are kept.
 
-    The way back looks for the unfolded coordinates first.  A column called as a result is replaced
-    in its place.
+    A map back to the folded space reads the columns unfolded_x, unfolded_y and unfolded_z if they
+    exist. A column with the name of a result is replaced in its place.
     """
     points = frame_points(frame, UNFOLDED if names == FOLDED else None)
     return frame.assign(**result_columns(names, carry(points)))

@@ -21,32 +21,37 @@ from geounfold.io.tables.points import PointTable, read_points
 MESH_ENDINGS = surface_endings()
 SURFACE_ENDINGS = (*MESH_ENDINGS, *TABLE_ENDINGS)
 _CORNERS = (("v1", "v2", "v3"), ("v0", "v1", "v2"))
-_LONG_EDGE = 4.0  # of the median edge: what the triangulation spans beyond the points' outline
-_STEEP = 0.1  # cosine between a triangle and the mean plane below which it stands upright
-_MOST_STEEP = 0.02  # share of upright triangles; a sheet that does not overhang has none
+_LONG_EDGE = 4.0  # median edges above which a triangle lies outside the points' outline
+_STEEP = 0.1  # cosine of a triangle's angle with the mean plane below which it is upright
+_MOST_STEEP = 0.02  # share of upright triangles allowed; without an overhang there are none
 
 
 def read_surface(path: str | Path) -> TriMesh:
     """Return the triangulated surface of a file.
 
-    Mesh files end as `MESH_ENDINGS`. A table (.csv, .csv.gz, .parquet) holds one vertex per row,
-    and in row k triangle k's three vertices in columns v1, v2, v3 (from 1) or v0, v1, v2 (from 0);
-    where there are more of one than of the other, the last rows are blank. A table of vertices
-    alone is triangulated over its mean plane, which asks that the surface nowhere overhangs it.
+    A table (.csv, .csv.gz, .parquet) holds one vertex per row. Row k also holds the vertex numbers
+    of triangle k, in columns v1, v2, v3 (from 1) or v0, v1, v2 (from 0). If the numbers of
+    vertices and triangles differ, the last rows of the fewer are blank. A table without triangles
+    is triangulated over its mean plane, so the surface must not overhang that plane.
+
+    Parameters
+    ----------
+    path : path
+        A file with one of `SURFACE_ENDINGS`.
 
     Raises
     ------
     InputError
-        An unknown ending, a file that cannot be read, fewer than one triangle, vertex numbers
-        out of range, or vertices alone that overhang their mean plane.
+        The ending is unknown; the file cannot be read or holds no triangle; vertex numbers are out
+        of range; or vertices without triangles overhang their mean plane.
     MissingDependencyError
-        A file whose library is not installed.
+        The format's library is not installed.
     """
     return read_surface_with_meta(path)[0]
 
 
 def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]]:
-    """Return the surface of a file, and its unit and coordinate reference where it tells them."""
+    """Return the surface of a file, and its unit and coordinate reference if it holds them."""
     path = Path(path)
     kind = ending(path)
     existing_file(path)
@@ -70,7 +75,7 @@ def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]
 
 
 def holds_surface(path: str | Path) -> bool:
-    """Return whether a file is a surface: by its ending, or by its content where that may be both.
+    """Return whether a file is a surface, by its ending, or by its content if the ending is shared.
 
     Raises
     ------
@@ -89,18 +94,18 @@ def holds_surface(path: str | Path) -> bool:
 
 
 def write_surface(path: str | Path, mesh: TriMesh, meta: Mapping[str, str] | None = None) -> None:
-    """Write a surface by the path's ending, tables with columns x, y, z, v1, v2, v3.
+    """Write a surface by the path's ending; tables have columns x, y, z, v1, v2, v3.
 
-    Coordinates come back bit for bit but from .stl, which is in single precision, and tables and
-    meshes with vertices in their order, but from .stl and .dxf, which do not number them. The
-    file is written in place: see `replacing`.
+    Coordinates are read back bit for bit, except from .stl, which is in single precision. Vertices
+    keep their order, except in .stl and .dxf, which do not number them. The file is written in
+    place; `replacing` writes one that appears whole or not at all.
 
     Raises
     ------
     OutputError
-        An unknown ending, or values that the format cannot hold.
+        The ending is unknown, or the format cannot hold the values.
     MissingDependencyError
-        A file whose library is not installed.
+        The format's library is not installed.
     """
     path = Path(path)
     kind = ending(path)
@@ -135,7 +140,7 @@ def _from_table(path: Path) -> TriMesh:
 
 
 def _vertices(table: Table, source: str) -> Floats:
-    """Return the vertices of a table that has triangles: rows below the last one have none."""
+    """Return the vertices of a table that has triangles; rows below the last vertex are blank."""
     where = coordinate_columns([str(n) for n in table.frame.columns], source=source)
     axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
     points = np.column_stack(axes)
@@ -165,7 +170,7 @@ def _triangles(columns: list[pd.Series], base: int, count: int, source: str) -> 
 
 
 def _draped(table: PointTable) -> TriMesh:
-    """Return the Delaunay triangulation of points seen across their mean plane."""
+    """Return the Delaunay triangulation of points projected onto their mean plane."""
     centred = table.points - table.points.mean(axis=0)
     if len(centred) < 3:
         raise InputError(f"{table.source}: a surface needs three points or more")
@@ -181,7 +186,7 @@ def _draped(table: PointTable) -> TriMesh:
 
 
 def _upward(table: PointTable, faces: Ints, normal: Floats) -> Ints:
-    """Return faces turned to one side of the mean plane; raise where many stand upright on it."""
+    """Return faces turned to one side of the mean plane; raise InputError if many are upright."""
     a, b, c = (table.points[faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
     size = np.linalg.norm(cross, axis=1)
@@ -190,7 +195,7 @@ def _upward(table: PointTable, faces: Ints, normal: Floats) -> Ints:
     if upright.mean() > _MOST_STEEP:
         raise InputError(
             f"{table.source}: a surface given by points alone must not overhang its mean plane, "
-            f"but {upright.mean():.0%} of the triangles stand upright; give triangles "
+            f"but {upright.mean():.0%} of the triangles are upright; give triangles "
             "(columns v1, v2, v3)"
         )
     turned = np.where((cosine < 0)[:, None], faces[:, ::-1], faces)

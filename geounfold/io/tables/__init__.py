@@ -1,1 +1,1 @@
-"""Tables of points: CSV and Parquet, whole, in parts and larger than memory."""
+"""Tables of points: CSV and Parquet files, read whole, in batches or in parts."""

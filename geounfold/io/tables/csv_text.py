@@ -1,4 +1,4 @@
-"""CSV text: how a file is read, its header, and how rows are written."""
+"""CSV files: content, header, rows as text, and tables written as CSV text."""
 
 from __future__ import annotations
 
@@ -20,18 +20,10 @@ from geounfold.io.column_values import objects
 from geounfold.io.paths import ending
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-
-
-_MOST_COLUMNS = 1 << 16  # what a line without end is cut into
-
-
-_CHUNK = 1 << 20
-
-
-_ROOM = 1 << 28  # bytes that any compressed table may unpack to
-
-
-_RATIO = 100  # ... and how often its own size where it is larger; tables of points: 3 to 10
+_MOST_COLUMNS = 1 << 16  # names in the first row beyond which the file is no table
+_CHUNK = 1 << 20  # bytes unpacked at once
+_ROOM = 1 << 28  # bytes that every compressed table may unpack to
+_RATIO = 100  # times its size that a larger one may unpack to; tables of points: 3 to 10
 
 
 _FOREIGN = {
@@ -59,7 +51,7 @@ def csv_reader(
 def csv_reader(
     stream: IO[bytes], columns: int, separator: str, skip: int, batch: int | None = None
 ) -> Any:
-    """Return a CSV's columns as text, numbered from 0, or what yields batches of its rows."""
+    """Return a CSV's columns as text, numbered from 0; with ``batch``, batches of its rows."""
     return pd.read_csv(
         stream,
         sep=separator,
@@ -79,7 +71,13 @@ def most_unpacked(path: Path) -> int:
 
 
 def text_content(path: Path) -> bytes:
-    """Return what a CSV holds, unpacked; not without end."""
+    """Return a CSV's bytes, unpacked.
+
+    Raises
+    ------
+    InputError
+        The file would unpack to more bytes than `most_unpacked`.
+    """
     if ending(path) != ".csv.gz":
         return path.read_bytes()
     chunks, total = [], 0
@@ -97,11 +95,17 @@ def text_content(path: Path) -> bytes:
 
 
 def csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
-    """Return a CSV's column names, its separator, and how many rows come before the first."""
+    """Return a CSV's column names, its separator, and the number of rows down to the header.
+
+    Raises
+    ------
+    InputError
+        The content is of another format, binary or empty, or its first row is no header.
+    """
     for magic, what in _FOREIGN.items():
         if content.startswith(magic):
             raise InputError(f"{path}: is not a CSV table but {what}")
-    if b"\0" in content:  # at which the parser would cut a value short
+    if b"\0" in content:  # the parser would cut a value short at it
         raise InputError(f"{path}: is not a table: it holds binary data")
     blank = 0
     lines = _lines(content)
@@ -111,7 +115,7 @@ def csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
         blank += 1
     else:
         raise InputError(f"{path}: the file is empty")
-    bare = "".join(line.split('"')[::2])  # what stands outside quotes
+    bare = "".join(line.split('"')[::2])  # the text outside quotes
     separator = max(",;\t", key=bare.count)
     names = next(csv.reader(chain([line], lines), delimiter=separator))
     if len(names) > _MOST_COLUMNS:
@@ -122,7 +126,7 @@ def csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
 
 
 def _lines(content: bytes) -> Iterator[str]:
-    """Yield lines with their ends, whichever these are, without a byte-order mark."""
+    """Yield lines with their ends, of any of the three kinds, without a byte-order mark."""
     start = len(codecs.BOM_UTF8) if content.startswith(codecs.BOM_UTF8) else 0
     while start < len(content):
         found = _LINE_END.search(content, start)
@@ -132,10 +136,10 @@ def _lines(content: bytes) -> Iterator[str]:
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:
-    """Return a frame as comma-separated lines."""
+    """Return a DataFrame as comma-separated lines."""
     head = [",".join(_quoted([str(name) for name in frame.columns]))] if header else []
     columns = [_fields(frame.iloc[:, i]) for i in range(frame.shape[1])]
-    if len(columns) == 1:  # a blank line would be no row
+    if len(columns) == 1:  # a blank line would not be read as a row
         columns = [[field or '""' for field in columns[0]]]
     return "\n".join([*head, *map(",".join, zip(*columns, strict=True)), ""])
 
@@ -154,7 +158,7 @@ def _fields(column: pd.Series) -> list[str]:
 
 
 def _quoted(fields: list[str]) -> list[str]:
-    """Return fields in quotes where their text needs them."""
+    """Return fields; those with a comma, a quote or a line end are in quotes."""
     blob = "".join(fields)
     if not any(sign in blob for sign in ',"\n\r'):
         return fields

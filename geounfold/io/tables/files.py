@@ -1,7 +1,8 @@
-"""Tables in and out, by the file's ending; what is read goes out unchanged.
+"""Tables read and written by the file's ending, values unchanged.
 
-A CSV's values stay the text they are (leading zeros, blanks and 20-digit numbers survive); only
-the columns that are asked for become numbers. Parquet columns keep their types.
+A CSV's values stay text, so that leading zeros, blanks and 20-digit numbers are written as they
+were read. Only the columns that the caller needs as numbers are converted. Parquet columns keep
+their types.
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ from geounfold.io.tables.csv_text import csv_header, csv_reader, csv_text, text_
 from geounfold.io.tables.parquet import ParquetParts, pyarrow_module
 
 Writer = Callable[..., None]
-"""Writes a DataFrame, and of its columns from a CSV what they show by their names."""
+"""Writes a DataFrame; a second argument holds the TextKind of columns from a CSV, by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as it is in its file.
+    """A table as its file holds it.
 
     Attributes
     ----------
     frame : DataFrame, n rows
-        Columns in the file's order under the file's names, even where two are called alike.
+        Columns in the file's order under the file's names, even if two have the same name.
     text : bool
         True for a CSV, whose columns are all text.
     columns : three str, optional
-        Names of the coordinates, where the file is one of points and not of columns.
+        Names of the coordinate columns, if the file's format defines them.
     meta : dict of str
-        Unit (``unit``) and coordinate reference (``crs``) of the coordinates, where the file
-        tells them.
+        Unit (``unit``) and coordinate reference (``crs``) of the coordinates, if the file holds
+        them.
     """
 
     frame: pd.DataFrame
@@ -54,19 +55,23 @@ class Table:
 
 
 def read_table(path: str | Path) -> Table:
-    """Return the table in a ``.csv``, ``.csv.gz`` or ``.parquet`` file, or one of other formats.
+    """Return the table in a file.
 
-    Those are of `geounfold.io.formats`; their points are columns x, y, z.
+    A CSV is in UTF-8, with or without a byte-order mark. Its first row names the columns. Commas,
+    semicolons or tabs separate them; the first row shows which.
 
-    A CSV is UTF-8 (with or without a byte-order mark), its first row names the columns, and
-    commas, semicolons or tabs separate them (found from the first row).
+    Parameters
+    ----------
+    path : path
+        A file ending in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`. Points
+        of those formats become columns x, y, z.
 
     Raises
     ------
     InputError
-        The file is missing, empty, a directory, no table, damaged, or holds no rows.
+        The file is missing, empty, a directory, not a table, damaged, or holds no rows.
     MissingDependencyError
-        A file whose library is not installed.
+        The format's library is not installed.
     """
     path = Path(path)
     kind = ending(path)
@@ -97,7 +102,7 @@ def _read_format(path: Path, kind: str) -> Table:
 
 @contextmanager
 def _as_input_error(path: Path) -> Iterator[None]:
-    """Turn what readers raise on a damaged file into one line."""
+    """Raise InputError, in one line, for the exceptions that readers raise on a damaged file."""
     try:
         yield
     except UnicodeDecodeError as error:
@@ -150,8 +155,8 @@ def _read_parquet(path: Path) -> Table:
 def with_columns(frame: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
     """Return the frame with columns added at its end; one of the same name is replaced in place.
 
-    Where several columns bear the name, the first is replaced and the others are dropped, so
-    that no name of ours is there twice.
+    If several columns of the frame have that name, the first is replaced and the others are
+    dropped.
     """
     series: list[Any] = []
     names: list[str] = []
@@ -180,29 +185,29 @@ def write_table(
     columns: tuple[str, str, str] | None = None,
     meta: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a table by the path's ending; floats come back bit for bit.
+    """Write a table by the path's ending; floats are read back bit for bit.
 
-    Missing values (NaN) are empty. The frame's index is not written. The file is written in
-    place: see `replacing` for one that appears whole or not at all.
+    Missing values (NaN) are written empty. The frame's index is not written. The file is written
+    in place; `replacing` writes one that appears whole or not at all.
 
     Parameters
     ----------
     path : path
-        Ends in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`.
+        A file ending in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`.
     frame : DataFrame
         The table.
     text : names of columns, optional
-        Columns that come from a CSV and whose types another file should find out: integers
-        or floats where every value is one, else text.
+        Columns of text from a CSV. Files of other formats get them as integers or floats if every
+        value is one, else as text.
     columns : three str, optional
-        Names of the coordinates, for formats of points (found by name without).
+        Names of the coordinate columns, for formats of points. By default they are found by name.
     meta : dict of str, optional
-        Unit and coordinate reference, for formats that have them.
+        Unit and coordinate reference, for formats that hold them.
 
     Raises
     ------
     MissingDependencyError
-        A file whose library is not installed.
+        The format's library is not installed.
     OutputError
         Values that the format cannot hold.
     """
@@ -217,7 +222,7 @@ def write_table(
 
 
 def check_writable(path: str | Path, frame: pd.DataFrame, text: tuple[str, ...] = ()) -> None:
-    """Raise what `write_table` would raise at the end, before anything is computed.
+    """Raise the errors that `write_table` would raise at the end, before anything is computed.
 
     Raises
     ------
@@ -239,7 +244,7 @@ def check_writable(path: str | Path, frame: pd.DataFrame, text: tuple[str, ...] 
 
 
 def _all_typed(frame: pd.DataFrame, text: tuple[str, ...]) -> pd.DataFrame:
-    """Return a frame whose columns from a CSV have the types they show."""
+    """Return a frame with its columns from a CSV as numbers if their values are."""
     series = [
         typed_values(frame.iloc[:, i]) if name in text else frame.iloc[:, i]
         for i, name in enumerate(frame.columns)
@@ -275,9 +280,10 @@ def _write_format(
 
 @contextmanager
 def table_writer(path: Path) -> Iterator[Writer]:
-    """Yield what writes one part of a table after the other into a file, by its ending.
+    """Yield a function that writes a table into a file, one part after the other.
 
-    All parts have the same columns; `write_table` says how their values are written.
+    The file's ending selects the format. All parts have the same columns; values are written as
+    by `write_table`.
     """
     kind = ending(path)
     with ExitStack() as stack:

@@ -1,8 +1,8 @@
-"""Large tables of points, a batch of rows at a time.
+"""Large tables of points, read and written in batches of rows.
 
-The coordinates are read first, and kept where the caller needs them all.  The other columns are
-read when the result is written, beside it and in the same batches, so that memory holds a batch of
-them at most.  What comes out is what `geounfold.io.points` would write.
+The coordinates are read first, and kept if the caller needs them all. The other columns are read
+when the result is written, in the same batches, so that memory holds at most one batch of them. The
+output is the same as for a table that is read whole (`PointTable`).
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from geounfold.io.tables.parquet import pyarrow_module
 from geounfold.io.tables.points import Place, PointTable, read_points
 
 BATCH = 1 << 17
-"""Rows in a batch."""
+"""Number of rows in a batch."""
 
 LARGE = 1 << 24
-"""Bytes of a CSV from which it is read in batches; of a compressed one, a fourth."""
+"""Bytes above which a CSV is read in batches; a compressed one above a fourth of it."""
 
-_HEAD = 1 << 20  # bytes among which the header is looked for
+_HEAD = 1 << 20  # bytes in which the header is looked for
 
 _FAULTS = (
     InputError,
@@ -50,20 +50,20 @@ _FAULTS = (
     zlib.error,
     csv.Error,
 )
-"""What readers raise on files that are no sound tables, Arrow's and pandas's errors included."""
+"""Exceptions of readers on damaged files, Arrow's and pandas's included."""
 
 Make = Callable[[pd.DataFrame, Floats, slice], dict[str, Any]]
-"""Returns the result's columns for a batch: its table, its points (k, 3), which rows of all."""
+"""Returns the result's columns for a batch, from its table, points (k, 3) and rows in the whole."""
 
 
 class Source(Protocol):
-    """A file of rows that can be read again and again."""
+    """A file of rows that can be read several times."""
 
     names: list[str]
     text: bool
 
     def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
-        """Yield the rows in batches; some columns alone where that is cheaper."""
+        """Yield the rows in batches, of all columns or of some, by position."""
 
 
 class ParquetSource:
@@ -78,7 +78,7 @@ class ParquetSource:
 
     @property
     def group_rows(self) -> list[int]:
-        """How many rows each row group has."""
+        """Number of rows in each row group."""
         meta = self._file.metadata
         return [int(meta.row_group(k).num_rows) for k in range(meta.num_row_groups)]
 
@@ -109,7 +109,7 @@ class CsvSource:
         return self._path.open("rb")
 
     def _check(self) -> None:
-        """Raise where the file holds binary data, or unpacks to no end."""
+        """Raise InputError if the file is binary or unpacks to more than `most_unpacked`."""
         most, total = most_unpacked(self._path), 0
         with self._open() as stream:
             while chunk := stream.read(_HEAD):
@@ -134,26 +134,26 @@ class CsvSource:
 
 @dataclass(frozen=True, eq=False)
 class PointStream:
-    """Points of a large file; see `geounfold.io.points.PointTable` for what it is like.
+    """Points of a large file, with the methods of `PointTable`.
 
     Attributes
     ----------
     source : str
-        The file, as it was named.
+        The file's path, as given.
     rows : Source
-        What its rows are read from.
+        The file's rows.
     columns : three str
         Names of the coordinate columns.
     kept : (n, 3) float or None
-        The coordinates, where they were to be kept.
+        World coordinates; None if they are not kept.
     count : int
-        How many points there are.
+        Number of points.
     dropped : (k,) int
-        The data rows left out for want of finite coordinates, counted from 1.
+        Data rows left out because a coordinate is not finite, counted from 1.
     place : callable or None
-        Takes the file's coordinates to the world's.
+        Returns world coordinates of the file's (see Place); None if the file holds the world's.
     meta : dict of str
-        Empty: these files tell neither unit nor coordinate reference.
+        Empty, because CSV and Parquet hold neither unit nor coordinate reference.
     """
 
     source: str
@@ -177,14 +177,14 @@ class PointStream:
 
     @cached_property
     def duplicates(self) -> int:
-        """How many points repeat the coordinates of an earlier one; they are kept."""
+        """Number of points with the coordinates of an earlier one; they are kept."""
         return count_duplicates(self.points)
 
     def check_writable(self, path: str | Path) -> None:
-        """Do nothing: a table can hold whatever another one holds."""
+        """Do nothing, because CSV and Parquet can hold each other's columns."""
 
     def facts(self) -> dict[str, Any]:
-        """Return what was read, for a summary."""
+        """Return the figures of what was read, for a summary."""
         return {
             "file": self.source,
             "columns": list(self.columns),
@@ -195,14 +195,14 @@ class PointStream:
         }
 
     def write_parts(self, path: str | Path, make: Make) -> None:
-        """Write the table with results added, a batch at a time.
+        """Write the table with results added, in batches.
 
         Parameters
         ----------
         path : path
-            Ends as one of `geounfold.io.tables.TABLE_ENDINGS`.
+            A file whose ending is one of `paths.TABLE_ENDINGS`.
         make : callable
-            See Make; called for one batch after the other, in order.
+            Returns a batch's results (see Make); called for one batch after the other.
 
         Raises
         ------
@@ -225,7 +225,7 @@ class PointStream:
                 write(with_columns(frame, results), own)
 
     def _parts(self) -> Iterator[tuple[pd.DataFrame, Floats, slice]]:
-        """Yield batches: all columns, the coordinates, and which of the points they are."""
+        """Yield batches: all columns, the coordinates (k, 3), and their rows among the points."""
         where = coordinate_columns(self.rows.names, self.columns, source=self.source)
         start, row, bad = 0, 0, self.dropped - 1
         for batch in self.rows.batches():
@@ -248,7 +248,7 @@ class PointStream:
             raise InputError(f"{self.source}: has changed while it was read; run again")
 
     def _kinds(self) -> dict[str, TextKind]:
-        """Return what each text column shows, over all rows."""
+        """Return the kind of each text column over all rows."""
         kinds: dict[str, TextKind] = {}
         for frame, _, _ in self._parts():
             for i, name in enumerate(self.rows.names):
@@ -273,14 +273,14 @@ def open_points(
     place: Place | None = None,
     keep: bool = True,
 ) -> PointTable | PointStream:
-    """Return the points of a file, in batches where it is large and a table.
+    """Return the points of a file, in batches if it is a large table.
 
     Parameters
     ----------
     path, columns, prefer, drop_invalid, place
-        As for `read_points`, errors too.
+        As `read_points` takes them; the errors are the same too.
     keep : bool
-        Whether the coordinates of a large file are kept.
+        Whether the coordinates of a large file are kept in memory.
     """
     source = _large(Path(path))
     if source is not None:
@@ -291,7 +291,7 @@ def open_points(
 
 
 def _large(path: Path) -> Source | None:
-    """Return what to read a large table from; None for a small, damaged or other file."""
+    """Return the rows of a large table; None for a small or damaged file, or another format."""
     kind = ending(path)
     if kind not in TABLE_ENDINGS or not path.is_file():
         return None
@@ -301,7 +301,7 @@ def _large(path: Path) -> Source | None:
             return parquet if parquet.rows > BATCH else None
         size = path.stat().st_size * (4 if kind == ".csv.gz" else 1)
         return CsvSource(path) if size > LARGE else None
-    except _FAULTS:  # whatever is wrong with the file, reading it whole says it
+    except _FAULTS:  # read_points then raises the error
         return None
 
 
@@ -314,7 +314,7 @@ def _opened(
     place: Place | None,
     keep: bool,
 ) -> PointStream | None:
-    """Return the points of a source; None where something is wrong, which `read_points` says."""
+    """Return the points of a source; None if something is wrong, for which `read_points` raises."""
     if len(set(source.names)) < len(source.names):
         return None
     if columns is None:
@@ -335,7 +335,7 @@ def _opened(
             row += len(frame)
             if keep:
                 kept.append(points)
-    except _FAULTS:  # whatever is wrong with the file, reading it whole says it
+    except _FAULTS:  # read_points then raises the error
         return None
     left_out = np.concatenate(dropped)
     if (len(left_out) and not drop_invalid) or len(left_out) == row:

@@ -1,4 +1,4 @@
-"""Parquet files, written part by part."""
+"""Parquet files, written one part after the other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,13 @@ if TYPE_CHECKING:
 
 
 def pyarrow_module() -> ModuleType:
-    """Return pyarrow with its Parquet part, or MissingDependencyError."""
+    """Return pyarrow with its Parquet part loaded.
+
+    Raises
+    ------
+    MissingDependencyError
+        pyarrow is not installed.
+    """
     try:
         import pyarrow.parquet
     except ImportError as error:
@@ -26,7 +32,7 @@ def pyarrow_module() -> ModuleType:
 
 
 class ParquetParts:
-    """A Parquet file that grows part by part."""
+    """A Parquet file that is written one part after the other."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -34,7 +40,15 @@ class ParquetParts:
         self._writer: Any = None
 
     def write(self, frame: pd.DataFrame, kinds: Mapping[str, TextKind] | None = None) -> None:
-        """Write a frame's columns as they are, those from a CSV in the types they show."""
+        """Write a part.
+
+        Parameters
+        ----------
+        frame : DataFrame
+            The part's rows; every part has the same columns.
+        kinds : mapping of str to TextKind, optional
+            Columns of text that are written as numbers, by name, and their kinds.
+        """
         pyarrow, kinds = self._pyarrow, kinds or {}
         names = [str(name) for name in frame.columns]
         arrays = [
@@ -43,7 +57,7 @@ class ParquetParts:
         ]
         table = pyarrow.Table.from_arrays(arrays, names=names)
         if self._writer is None:
-            # Coordinates hardly repeat: a dictionary of them costs time and room.
+            # Coordinates hardly repeat, so a dictionary of them costs time and space.
             others = [f.name for f in table.schema if not pyarrow.types.is_floating(f.type)]
             unique = len(set(names)) == len(names)
             self._writer = pyarrow.parquet.ParquetWriter(

@@ -1,4 +1,4 @@
-"""Tables cut into parts that can be read one without the others, for many processes at once."""
+"""Tables cut into parts that are read independently, by several processes at once."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from geounfold.io.tables.large import BATCH, CsvSource, ParquetSource
 from geounfold.io.tables.parquet import pyarrow_module
 
 BYTES = 1 << 25
-"""Of a CSV in one part, about."""
+"""Bytes of a CSV in one part, about."""
 
-_READ = 1 << 20
+_READ = 1 << 20  # bytes read at once to find the ends of rows
 _NEWLINE, _QUOTE = 10, 34
 
 
@@ -37,9 +37,9 @@ class Part:
     start, stop : int
         Row groups of a Parquet file, or bytes of a CSV.
     row : int
-        Rows of the table before this part (of a CSV, blank lines counted).
+        Number of rows of the table before this part; blank lines of a CSV count.
     separator : str
-        Between a CSV's values; empty for Parquet.
+        A CSV's separator; empty for Parquet.
     """
 
     path: str
@@ -55,7 +55,7 @@ class Part:
         return bool(self.separator)
 
     def frame(self) -> pd.DataFrame:
-        """Return the rows, every column, as `geounfold.io.read_table` would."""
+        """Return the rows with every column, as `read_table` returns them."""
         if self.text:
             return self._csv_frame()
         file = pyarrow_module().parquet.ParquetFile(self.path)
@@ -81,7 +81,7 @@ def parts_of(path: str | Path) -> list[Part]:
     Raises
     ------
     InputError
-        No such file, another format, no table, or files whose columns differ.
+        The file is missing, of another format or not a table, or the files' columns differ.
     """
     path = Path(path)
     files = _files(path) if path.is_dir() else [path]
@@ -99,7 +99,7 @@ def parts_of(path: str | Path) -> list[Part]:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return a folder's tables by name; those that begin with a point or a line are none."""
+    """Return a folder's tables by name, without names that begin with a point or underscore."""
     files = [f for f in sorted(folder.iterdir()) if f.is_file() and f.name[0] not in "._"]
     endings = {ending(f) for f in files}
     if len(endings) != 1 or not endings <= {".csv", ".parquet"}:
@@ -109,7 +109,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _split(path: Path, row: int) -> tuple[list[Part], int]:
-    """Return a file's parts, and how many rows it has; ``row`` come before."""
+    """Return a file's parts and its number of rows; ``row`` rows of other files come before."""
     kind = ending(path)
     existing_file(path)
     if kind not in (".csv", ".parquet"):
@@ -119,7 +119,7 @@ def _split(path: Path, row: int) -> tuple[list[Part], int]:
     try:
         return _parquet_parts(path, row) if kind == ".parquet" else _csv_parts(path, row)
     except (InputError, OSError, ValueError) as error:
-        read_table(path)  # which says what is wrong
+        read_table(path)  # raises an error that names the fault, if it finds one
         raise InputError(f"{path}: cannot be read in parts: {error}") from error
 
 
@@ -158,9 +158,10 @@ def _csv_parts(path: Path, row: int) -> tuple[list[Part], int]:
 
 
 def _cuts(ends: np.ndarray, seen: int, due: int) -> Iterator[int]:
-    """Yield which row ends to cut at: the header's, and then wherever a part is full.
+    """Yield the row ends to cut at: the header's, and then the first one after each full part.
 
-    ``seen`` rows came before, counted from the first after the header; ``due`` is the next place.
+    ``seen`` is the number of rows before, counted from the first after the header, and ``due`` the
+    byte from which the next part begins.
     """
     if seen < 0 <= seen + len(ends):
         yield -seen - 1
@@ -174,7 +175,7 @@ def _cuts(ends: np.ndarray, seen: int, due: int) -> Iterator[int]:
 
 
 def _row_ends(path: Path) -> Iterator[np.ndarray]:
-    """Yield, piece by piece of a CSV, where its rows end: behind newlines outside quotes."""
+    """Yield, by chunks of a CSV, where its rows end: behind newlines outside quotes."""
     at, quoted = 0, 0
     with path.open("rb") as stream:
         while chunk := stream.read(_READ):
@@ -191,5 +192,5 @@ def _row_ends(path: Path) -> Iterator[np.ndarray]:
 
 def _names(path: Path, names: list[str]) -> tuple[str, ...]:
     if len(set(names)) < len(names):
-        raise InputError(f"{path}: two columns are called alike; rename all but one")
+        raise InputError(f"{path}: two columns have the same name; rename all but one")
     return tuple(names)

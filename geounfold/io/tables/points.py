@@ -1,4 +1,4 @@
-"""Tables of points: coordinates checked, everything else kept as it is."""
+"""Tables of points: coordinates are checked, all other columns kept unchanged."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from geounfold.io.messages import counted, rows_named
 from geounfold.io.tables.files import check_writable, read_table, with_columns, write_table
 
 Place = Callable[[Floats], Floats]
-"""Takes points (n, 3) from a model's own coordinates to the world's."""
+"""Returns world coordinates (n, 3) of points in a model's own coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointTable:
-    """Points of a file with everything that stands beside them.
+    """Points of a file, with all its columns.
 
     Attributes
     ----------
     source : str
-        The file, as it was named.
+        The file's path, as given.
     frame : DataFrame, n rows
         Every column, in order; a CSV's as text (see `numbers`).
     columns : three str
@@ -37,11 +37,11 @@ class PointTable:
     points : (n, 3) float
         World coordinates, in the file's unit; finite.
     dropped : (k,) int
-        The data rows left out for want of finite coordinates (1 is the first after the header).
+        Data rows left out because a coordinate is not finite; 1 is the first one.
     text : bool
-        True where the columns are text because the file is a CSV.
+        Whether the columns are text, because the file is a CSV.
     meta : dict of str
-        Unit and coordinate reference, where the file tells them.
+        Unit and coordinate reference, if the file holds them.
     """
 
     source: str
@@ -57,11 +57,11 @@ class PointTable:
 
     @cached_property
     def duplicates(self) -> int:
-        """How many points repeat the coordinates of an earlier one; they are kept."""
+        """Number of points with the coordinates of an earlier one; they are kept."""
         return int(pd.DataFrame(self.points).duplicated().sum())
 
     def numbers(self, column: str) -> Floats:
-        """Return any column's values, (n,) float, NaN where missing.
+        """Return a column's values, (n,) float; missing ones are NaN.
 
         Raises
         ------
@@ -75,7 +75,7 @@ class PointTable:
         return numbers(self.frame.iloc[:, int(where[0])], source=self.source)
 
     def with_columns(self, columns: dict[str, Any]) -> pd.DataFrame:
-        """Return the frame with results added at the end, or in place of ones of the same name.
+        """Return the frame with results at its end; one of the same name is replaced in place.
 
         Raises
         ------
@@ -99,11 +99,11 @@ class PointTable:
     def write_parts(
         self, path: str | Path, make: Callable[[pd.DataFrame, Floats, slice], dict[str, Any]]
     ) -> None:
-        """Write the table with the results that `make` returns for the points and their rows."""
+        """Write the table with the results that ``make(frame, points, rows)`` returns."""
         self.write(path, make(self.frame, self.points, slice(0, len(self))))
 
     def check_writable(self, path: str | Path) -> None:
-        """Raise OutputError where a file of this ending cannot hold the table's columns."""
+        """Raise OutputError if a file of this ending cannot hold the table's columns."""
         check_writable(path, self.frame, self._text_columns)
 
     @property
@@ -111,7 +111,7 @@ class PointTable:
         return tuple(str(n) for n in self.frame.columns) if self.text else ()
 
     def facts(self) -> dict[str, Any]:
-        """Return what was read, for a summary."""
+        """Return the figures of what was read, for a summary."""
         return {
             "file": self.source,
             "columns": list(self.columns),
@@ -138,19 +138,19 @@ def read_points(
     path : path
         The file.
     columns : three str, optional
-        Names of the coordinate columns (see `coordinate_columns` for those found without).
+        Names of the coordinate columns. By default `coordinate_columns` finds them.
     prefer : tuples of three str, optional
-        Names to take first where a table has all three, as ``unfolded_x`` ... of an output.
+        Names that are taken first if a table has all three, such as an output's ``unfolded_x`` ...
     drop_invalid : bool, optional
-        Leave out rows whose coordinates are missing or infinite instead of refusing them.
+        True to leave out rows whose coordinates are missing or infinite; False to raise an error.
     place : callable, optional
-        Takes a model's own coordinates, which the file then holds, to the world's.
+        Returns world coordinates of a model's own, for a file in the latter (see Place).
 
     Raises
     ------
     InputError
-        A file that cannot be read, columns missing, ambiguous or not numeric, coordinates
-        missing, infinite or too large, or no rows left.
+        The file cannot be read; columns are missing, ambiguous or not numeric; coordinates are
+        missing, infinite or too large; or no rows are left.
     """
     source = str(path)
     table = read_table(path)
@@ -182,16 +182,16 @@ def _invalid(rows: Ints, total: int, source: str) -> InputError:
     return InputError(
         f"{source}: {len(rows)} of {counted(total, 'row')} {verb} a missing or infinite "
         f"coordinate: {rows_named(rows.tolist())} (counted from 1 after the header); correct "
-        "them, or go on without them by --drop-invalid"
+        "them, or leave them out by --drop-invalid"
     )
 
 
 def _check_size(points: Floats, valid: Bools, source: str) -> None:
-    """Raise where a finite coordinate is too large for neighbours to be told apart."""
+    """Raise InputError if a finite coordinate is too large for neighbouring blocks to differ."""
     huge = np.flatnonzero(valid & (np.abs(points) > LARGEST_COORDINATE).any(axis=1))
     if len(huge):
         row = int(huge[0])
         raise InputError(
-            f"{source}: data row {row + 1} has a coordinate beyond {LARGEST_COORDINATE:g}, where "
-            f"numbers cannot resolve a block: {points[row].tolist()}"
+            f"{source}: data row {row + 1} has a coordinate beyond {LARGEST_COORDINATE:g}, too "
+            f"large for numbers to resolve a block: {points[row].tolist()}"
         )

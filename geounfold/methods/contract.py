@@ -16,7 +16,7 @@ from geounfold.geometry.measures import face_normals, triangle_areas
 from geounfold.geometry.mesh import Bools, Floats, Space, TriMesh, in_space
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.sheet.options import SheetOptions
-from geounfold.methods.sheet.stages import SheetResult
+from geounfold.methods.sheet.result import SheetResult
 from geounfold.surfaces.hull import Hull
 from geounfold.surfaces.split.result import SurfaceSplit
 

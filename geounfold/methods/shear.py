@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from geounfold.methods.contract import BodyFit, PreparedBody, by_rule
-from geounfold.methods.sheet.method import sheet_stages
+from geounfold.methods.sheet.stages import sheet_stages
 from geounfold.methods.vertical_heights import vertical_rule, vertical_warnings
 
 

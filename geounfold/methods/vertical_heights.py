@@ -13,7 +13,7 @@ from geounfold.geometry.measures import unit
 from geounfold.geometry.mesh import Bools, Floats, TriMesh
 from geounfold.mapping.control_mesh import Datum
 from geounfold.methods.contract import Placed, PreparedBody, mean_top_normal
-from geounfold.methods.sheet.stages import SheetResult
+from geounfold.methods.sheet.result import SheetResult
 
 _STEEPEST = 3.0  # rise over run beyond which a border is continued level (72 degrees)
 _STANDING = 0.05  # |cosine| of the top's mean normal and up below which a sheet stands on end

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
-
-import numpy as np
+from dataclasses import asdict
 
 from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair
-from geounfold.methods.sheet.stages import SheetResult, fit_body
+from geounfold.methods.sheet.stages import sheet_stages
 
 
 def sheet_method(body: PreparedBody) -> BodyFit:
@@ -27,6 +25,7 @@ def sheet_method(body: PreparedBody) -> BodyFit:
     unit = 1 if body.coarse is None else body.coarse.merge
     notes = {
         "merged": unit,
+        "attempts": [trial.row() for trial in result.trials],
         "rung": mesh.rungs[-1].name,
         "rungs": [asdict(rung) for rung in mesh.rungs],
         "roughness": result.fitted.roughness,
@@ -45,33 +44,3 @@ def sheet_method(body: PreparedBody) -> BodyFit:
         result,
         notes,
     )
-
-
-def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
-    """Return the stages of the sheet method; other methods take their surfaces from them.
-
-    Parameters
-    ----------
-    body : Body
-        See there.
-    datum : str
-        Which surface is flat.
-    shell : float
-        How far past the control mesh its shell reaches, in blocks.
-    """
-    variance = np.zeros(3) if body.hull is None else body.hull.blur_variance(body.frame.sides)
-    chosen = body.sheet_options
-    with body.stage("sheet"):
-        return fit_body(
-            body.split,
-            body.points,
-            body.blocks,
-            body.frame.steps,
-            variance,
-            0.0 if body.hull is None else body.hull.inset,
-            body.flatten,
-            replace(chosen, control=replace(chosen.control, shell=shell)),
-            datum,
-            exact=body.hull is None,
-            coarse=body.coarse,
-        )

@@ -35,37 +35,53 @@ Flatten = Callable[[TriMesh, Floats | None], Flattening]
 """``flatten(mesh, start)``: a surface laid flat from a start, (n, 2) or None."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ControlOptions:
-    """Shape of the control mesh; lengths in blocks.
+CELL = 1.5
+"""Side of the footprint's cells, in blocks."""
 
-    ``cell``: side of the footprint's cells, and ``widest``, ``turn``, ``many``: on footprints of
-    more cells than ``many`` cells grow up to the widest while the surface turns by no more than
-    ``turn`` radians over one; ``turn_merged``: the same where blocks were merged, and cells are
-    as much wider as allows; ``dilation``: rings of cells past the blocks;
-    ``pad``: height of the mesh past the blocks where offsets are constant; ``pad_capped``:
-    where they vary; ``focal``: largest share of the focal distance, ``focal_refined``: the same
-    with cells of half the side; ``slopes``: of the caps along the sheet, tried in order;
-    ``slope``: the offset surfaces that are flattened lie within this share of the caps;
-    ``reach``: radius, in cells, of the filter on varying offsets;
-    ``shrinks``: most steps of the repair; ``shell``: how far the shell reaches past the mesh.
+PAD = 0.6
+"""Height of the mesh past the outermost blocks, in blocks, if offsets are constant."""
+
+PAD_CAPPED = 1.0
+"""The same if offsets follow the blocks."""
+
+SHELL = 3.0
+"""Distance past the control mesh that its shell reaches, in blocks."""
+
+SHRINKS = 40
+"""Most steps of the repair."""
+
+_WIDEST = 3.0  # side of the cells at most, blocks, on footprints of more than _MANY of them
+_MANY = 8000
+_TURN = 0.1  # radians by which the surface may turn over one of these wider cells
+_TURN_MERGED = 0.25  # the same if blocks were merged; cells are as wide as it allows
+_DILATION = 1  # rings of cells past the blocks
+_FOCAL = 0.9  # largest share of the focal distance that an offset takes
+_FOCAL_REFINED = 0.95  # the same with cells of half the side
+_SLOPES = (0.3, 0.6, 1.2)  # slopes of the caps along the sheet, tried in order
+_SAFE = 0.7  # share of the caps within which the flattened parallel surfaces lie
+_FILTER = 3  # radius, in cells, of the filter on varying offsets
+
+
+@dataclass(frozen=True)
+class MeshPlan:
+    """What a control mesh is to be like.
+
+    Attributes
+    ----------
+    flatten : callable
+        Lays a surface flat; see `Flatten`.
+    datum : str
+        Which surface is flat: mid, top, bottom or proportional.
+    cell : float
+        Side of the footprint's cells, in blocks.
+    shell : float
+        Distance past the control mesh that its shell reaches, in blocks.
     """
 
-    cell: float = 1.5
-    widest: float = 3.0
-    turn: float = 0.1
-    many: int = 8000
-    turn_merged: float = 0.25
-    dilation: int = 1
-    pad: float = 0.6
-    pad_capped: float = 1.0
-    focal: float = 0.9
-    slope: float = 0.7
-    reach: int = 3
-    slopes: tuple[float, ...] = (0.3, 0.6, 1.2)
-    focal_refined: float = 0.95
-    shrinks: int = 40
-    shell: float = 3.0
+    flatten: Flatten
+    datum: str = "mid"
+    cell: float = CELL
+    shell: float = SHELL
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,11 +233,11 @@ def _focal_caps(curvature: Floats, focal: float) -> Floats:
     return np.asarray(focal / np.maximum(curvature, _STRAIGHT))
 
 
-def _offsets(columns: Columns, foot: Foot, caps: Floats, options: ControlOptions) -> Floats:
+def _offsets(columns: Columns, foot: Foot, caps: Floats) -> Floats:
     """Return offsets (2, n) that follow the blocks under caps (2, n)."""
     prints, use = columns.prints, foot.miss < 0.5
     need = [prints.cell_max(s * foot.t, use) for s in (1.0, -1.0)]
-    follow = [prints.at_nodes(q, options.reach) + options.pad_capped for q in need]
+    follow = [prints.at_nodes(q, _FILTER) + PAD_CAPPED for q in need]
     return np.minimum(np.stack(follow), caps)
 
 
@@ -255,7 +271,7 @@ def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
 
 
 def _footprint(
-    sheet: MidSurface, U: Floats, options: ControlOptions, unit: float, side: float | None
+    sheet: MidSurface, U: Floats, plan: MeshPlan, unit: float, side: float | None
 ) -> Footprint:
     """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow.
 
@@ -265,16 +281,16 @@ def _footprint(
     angle = principal_direction(sheet, U)
 
     def prints_of(cell: float) -> Footprint:
-        rings = int(np.ceil(options.shell / cell))
-        return footprint(U, angle, cell, options.dilation, rings)
+        rings = int(np.ceil(plan.shell / cell))
+        return footprint(U, angle, cell, _DILATION, rings)
 
-    start = options.cell if side is None else side
+    start = plan.cell if side is None else side
     if side is None and unit > 1:
-        start = float(np.clip(options.turn_merged / _bend(sheet, U), start, start * unit))
+        start = float(np.clip(_TURN_MERGED / _bend(sheet, U), start, start * unit))
     prints = prints_of(start)
-    if side is not None or len(prints.F) <= 2 * options.many:
+    if side is not None or len(prints.F) <= 2 * _MANY:
         return prints
-    cell = min(options.widest, options.turn / _bend(sheet, prints.U))
+    cell = min(_WIDEST, _TURN / _bend(sheet, prints.U))
     return prints_of(cell) if cell > start else prints
 
 
@@ -289,24 +305,22 @@ def _columns(
     horizons: Horizons,
     foot: Foot,
     cell: float | None,
-    flatten: Flatten,
-    options: ControlOptions,
-    datum: str,
+    plan: MeshPlan,
 ) -> Columns:
     """Return the columns over the blocks' footprint; ``cell`` None chooses its cells' side."""
     sheet = fitted.sheet
-    prints = _footprint(sheet, foot.U, options, fitted.unit, cell)
+    prints = _footprint(sheet, foot.U, plan, fitted.unit, cell)
     every = np.concatenate([prints.U, prints.ring.U])
     k1, k2 = principal_curvatures(sheet.jet(every))
     curvature = np.stack([k1, -k2])
     n = len(prints.U)
-    reach = _reach(foot, options)
-    caps = _focal_caps(curvature[:, :n], options.focal)
-    safe = [min(reach, options.slope * float(np.percentile(c, 0.5))) for c in caps]
+    reach = _reach(foot)
+    caps = _focal_caps(curvature[:, :n], _FOCAL)
+    safe = [min(reach, _SAFE * float(np.percentile(c, 0.5))) for c in caps]
     nodes = _lifted_nodes(sheet, every, prints)
     slip = sheet.grid.value(fitted.slip, every)
     flat = _safely_flat(
-        nodes, prints, _profile(fitted, foot), slip[:n], (safe[0], safe[1]), flatten
+        nodes, prints, _profile(fitted, foot), slip[:n], (safe[0], safe[1]), plan.flatten
     )
     bottom, top = horizons.crossings(prints.U, slip[:n], limit=2 * reach)
     means = [float(np.average(h, weights=prints.weight)) for h in (bottom, top)]
@@ -323,8 +337,8 @@ def _columns(
         high=top,
         flattenings=flat.flattenings,
         horizons=horizons,
-        datum=Datum(datum, means[0], means[1]),
-        reach=options.shell,
+        datum=Datum(plan.datum, means[0], means[1]),
+        reach=plan.shell,
     )
 
 
@@ -353,9 +367,9 @@ def _profile(fitted: FittedSheet, foot: Foot) -> CrossSection:
     return CrossSection(axes, span)
 
 
-def _reach(foot: Foot, options: ControlOptions) -> float:
+def _reach(foot: Foot) -> float:
     """Return the offset that holds every block."""
-    return float(np.abs(foot.t[foot.miss < 0.5]).max()) + options.pad
+    return float(np.abs(foot.t[foot.miss < 0.5]).max()) + PAD
 
 
 def build_control(
@@ -363,9 +377,7 @@ def build_control(
     horizons: Horizons,
     points: Floats,
     blocks: Floats,
-    flatten: Flatten,
-    options: ControlOptions,
-    datum: str = "mid",
+    plan: MeshPlan,
 ) -> SheetMesh:
     """Return the control mesh that holds the blocks, in both spaces (see SheetMesh).
 
@@ -383,37 +395,33 @@ def build_control(
         What the sheet was fitted to, working units.
     blocks : (b, 3) float
         Blocks as they were given, which the mesh has to hold.
-    flatten : callable
-        See Flatten.
-    options : ControlOptions
-        See there.
-    datum : str
-        Which surface is flat; see Datum.
+    plan : MeshPlan
+        What the mesh is to be like.
     """
     foot = block_feet(fitted, points, reach=10.0 * fitted.unit)
-    columns = _columns(fitted, horizons, foot, None, flatten, options, datum)
-    reach = _reach(foot, options)
+    columns = _columns(fitted, horizons, foot, None, plan)
+    reach = _reach(foot)
 
     def constant() -> tuple[Columns, Layers]:
         offsets = np.full((2, columns.count), reach)
         return columns, columns.layers(offsets, FRACTIONS)
 
     def capped(slope: float) -> tuple[Columns, Layers]:
-        caps = _sloping_caps(columns, options.focal, slope)
-        return columns, columns.layers(_offsets(columns, foot, caps, options), FRACTIONS)
+        caps = _sloping_caps(columns, _FOCAL, slope)
+        return columns, columns.layers(_offsets(columns, foot, caps), FRACTIONS)
 
     def refined() -> tuple[Columns, Layers]:
         cell = columns.prints.cell / 2
-        finer = _columns(fitted, horizons, foot, cell, flatten, options, datum)
-        caps = _sloping_caps(finer, options.focal_refined, options.slopes[-1])
-        return finer, finer.layers(_offsets(finer, foot, caps, options), FINE_FRACTIONS)
+        finer = _columns(fitted, horizons, foot, cell, plan)
+        caps = _sloping_caps(finer, _FOCAL_REFINED, _SLOPES[-1])
+        return finer, finer.layers(_offsets(finer, foot, caps), FINE_FRACTIONS)
 
     rungs: list[tuple[str, Callable[[], tuple[Columns, Layers]]]]
-    rungs = [("capped", partial(capped, slope)) for slope in options.slopes]
+    rungs = [("capped", partial(capped, slope)) for slope in _SLOPES]
     rungs.append(("refined", refined))
-    if not (_room(columns, options.focal) < reach).any():
+    if not (_room(columns, _FOCAL) < reach).any():
         rungs.insert(0, ("constant", constant))
-    climbed = climb(rungs, blocks, options.shrinks)
+    climbed = climb(rungs, blocks, SHRINKS)
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}

@@ -24,32 +24,39 @@ from geounfold.methods.sheet.mid_surface.spline import SplineGrid, density_weigh
 from geounfold.methods.sheet.mid_surface.surface import near_any
 from geounfold.methods.sheet.sharpening.by_lattice_sites import separating_step
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites
-from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, SiteRules
 from geounfold.methods.sheet.sharpening.site_places import Places
 
 
-@dataclass(frozen=True, kw_only=True)
-class HorizonOptions:
-    """How top and bottom are fitted; lengths in blocks.
+_SMOOTH = 1.5
+"""Smoothing length of the heights, in blocks."""
 
-    ``smooth``: smoothing length of the heights; ``agree``: least cosine between a hull normal
-    and the mid surface's, below which a sample is rim; ``erosion``: distance kept from the
-    rim, where hulls are rounded; ``misfit``: largest departure from the half thickness;
-    ``stiffness``: pull towards the half thickness where there are no samples; ``separate``:
-    smoothing length of what the sites add; ``margins``: softness of the separation, round by
-    round; ``blurred``: half thickness up to which the hull's heights are not used; from one
-    block more they are; ``thinnest``: half thickness below which sites are left alone.
-    """
+_AGREE = 0.9
+"""Cosine between a hull normal and the mid surface's below which a hull vertex is rim."""
 
-    smooth: float = 1.5
-    agree: float = 0.9
-    erosion: float = 0.5
-    misfit: float = 2.5
-    stiffness: float = 1e-4
-    separate: float = 1.5
-    margins: tuple[float, ...] = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
-    blurred: float = 2.0
-    thinnest: float = 0.25
+_EROSION = 0.5
+"""Distance kept from the rim, in blocks: hulls are rounded there."""
+
+_MISFIT = 2.5
+"""Departure from the half thickness, in blocks, above which a hull vertex is not used."""
+
+_STIFFNESS = 1e-4
+"""Weight that draws the heights to the half thickness where there are no hull vertices."""
+
+_SEPARATE = 1.5
+"""Smoothing length of what the lattice sites add to the heights, in blocks."""
+
+_MARGINS = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
+"""Softness of the separation in each round, in blocks."""
+
+_BLURRED = 2.0
+"""Half thickness, in blocks, up to which the heights of the hull are not used at all.
+
+From one block more they are used in full.
+"""
+
+_THINNEST = 0.25
+"""Half thickness, in blocks, below which lattice sites are not used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +102,7 @@ class Horizons:
 
 
 def fit_horizons(
-    fitted: FittedSheet, samples: HullSamples, knots: float, options: HorizonOptions
+    fitted: FittedSheet, samples: HullSamples, knots: float
 ) -> Horizons:
     """Return the height fields of top and bottom fitted to the hull (see Horizons)."""
     sheet, grid = fitted.sheet, fitted.sheet.grid
@@ -104,19 +111,19 @@ def fit_horizons(
     side = np.sign(cos)
     height = unbiased_heights(sheet, foot, side, samples)
     flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
-    rim = near_any(samples.points, np.abs(cos) < options.agree, options.erosion)
+    rim = near_any(samples.points, np.abs(cos) < _AGREE, _EROSION)
     nodes, _ = sheet.samples()
     P = grid.basis(nodes)
     sampled = grid.gram(P, np.ones(len(nodes)))
     half = sampled.solver(RIDGE)(P.T @ np.maximum(grid.value(fitted.half, nodes), 0.2))
-    bending = (options.smooth / knots) ** 4 * grid.energy(2)
-    still = bending + options.stiffness * sampled
+    bending = (_SMOOTH / knots) ** 4 * grid.energy(2)
+    still = bending + _STIFFNESS * sampled
     found = []
     for s in (1.0, -1.0):
         reach = fitted.reach(s, half)
         expected = grid.value(reach, flat)
         use = (foot.miss < 0.1) & (side == s) & ~rim
-        use &= np.abs(s * foot.t - expected) < options.misfit
+        use &= np.abs(s * foot.t - expected) < _MISFIT
         B = grid.basis(flat[use])
         w = density_weights(flat[use], knots) if use.any() else np.empty(0)
         K = grid.gram(B, w) + still
@@ -129,8 +136,7 @@ def separate_horizons(
     fitted: FittedSheet,
     hull: Horizons,
     sites: Sites,
-    options: HorizonOptions,
-    occupancy: SiteOptions,
+    rules: SiteRules,
 ) -> Horizons:
     """Return the height fields of top and bottom that separate blocks from empty sites.
 
@@ -145,29 +151,27 @@ def separate_horizons(
         Fitted to the hull: the start, unless the sheet is thin.
     sites : Sites
         Lattice sites at the body's surface.
-    options : HorizonOptions
-        See there.
-    occupancy : OccupancyOptions
-        How sites are chosen.
+    rules : SiteRules
+        Which sites are used.
     """
     grid = fitted.sheet.grid
     nodes, _ = fitted.sheet.samples()
     held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
-    still = (options.separate * fitted.unit / grid.step) ** 4 * grid.energy(
+    still = (_SEPARATE * fitted.unit / grid.step) ** 4 * grid.energy(
         2
-    ) + options.stiffness * held
+    ) + _STIFFNESS * held
     sharp = [fitted.reach(side, fitted.half) for side in (1.0, -1.0)]
-    trust = np.clip(fitted.half / fitted.unit - options.blurred, 0.0, 1.0)
+    trust = np.clip(fitted.half / fitted.unit - _BLURRED, 0.0, 1.0)
     start = (
         sharp[0] + trust * (hull.top - sharp[0]),
         sharp[1] + trust * (-hull.bottom - sharp[1]),
     )
     reach = start
-    occupancy = replace(occupancy, thinnest=options.thinnest)
-    places = Places.of(fitted, sites, occupancy)
+    rules = replace(rules, thinnest=_THINNEST)
+    places = Places.of(fitted, sites, rules)
     places.follow(fitted.sheet, reach, fitted.slip, steps=1)
-    for margin in options.margins:
-        use = places.explained(margin, occupancy.depths[-1], occupancy)
+    for margin in _MARGINS:
+        use = places.explained(margin, DEPTHS[-1], rules)
         above = places.side[use] > 0
         rise = [
             _rise(places, mine, grid, margin, still, now - first, fitted.unit <= 1)

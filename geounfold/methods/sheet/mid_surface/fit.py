@@ -28,58 +28,59 @@ RIDGE = 1e-9
 """Weight that holds coefficients which nothing else reaches."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitOptions:
-    """Resolution, smoothness and acceptance of the sheet fit; lengths in blocks.
+KNOTS = 3.5
+"""Spacing of the spline's knots, in blocks."""
 
-    ``knots``: spline knot spacing; ``cell``: spacing of the searched sampling; ``smooth``:
-    length below which the mid surface is smoothed, on smooth hulls and (times ``rough``)
-    on staircases, by residuals between ``quiet`` and ``loud``; ``smooth_half``: the same for
-    the half thickness, and ``order_half`` the order of its differences that are kept small: 2,
-    or 3 where it may taper all the way; ``weak``: weight of medial points off the core;
-    ``unseen``: weight of curvature, felt where no sample tells it, across a narrow strip;
-    ``rounds``: growth rounds; ``agree``: least cosine between a sample's normal and the
-    predicted one; ``first``/``later``: largest thickness misfit of an accepted sample in round
-    one and after; ``erosion``: distance kept from rejected samples; ``reach``: how far past the
-    accepted samples the sheet is searched; ``ahead``: samples whose feet lie farther than this
-    from the last round's accepted ones are left for later rounds.
+SMOOTH = 2.2
+"""Length in blocks below which the mid surface is smoothed on smooth hulls."""
+
+_CELL = 1.5  # spacing of the sampling that feet are searched in, blocks
+_REACH = 4.0  # distance past the accepted hull vertices within which feet are searched, blocks
+_QUIET, _LOUD = 0.03, 0.08  # residuals in blocks: smooth hulls below, staircases above
+_WEAK = 1e-4  # weight of medial points off the core
+_FIRST = 1.5  # departure from the half thickness that is accepted in round one, blocks
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitSettings:
+    """How one attempt fits the mid surface; lengths in blocks.
+
+    Attributes
+    ----------
+    smooth : float
+        Length below which the mid surface is smoothed on smooth hulls.
+    rough : float
+        Factor on that length on staircases.
+    smooth_half : float
+        Length below which the half thickness is smoothed.
+    order_half : int
+        Order of the differences of the half thickness that are kept small: 2, or 3 if it may
+        taper all the way.
+    unseen : float
+        Weight of curvature, which decides across a narrow strip that no hull vertex reaches.
+    rounds : int
+        Rounds of growth.
+    agree : float
+        Least cosine between the normal of an accepted hull vertex and the predicted normal.
+    later : float
+        Departure from the half thickness that is accepted after round one.
+    erosion : float
+        Distance kept from rejected hull vertices.
+    ahead : float
+        Hull vertices whose feet lie farther than this from the accepted ones of the round before
+        are left for later rounds.
     """
 
-    knots: float = 3.5
-    cell: float = 1.5
-    smooth: float = 2.2
+    smooth: float = SMOOTH
     rough: float = 1.5
-    quiet: float = 0.03
-    loud: float = 0.08
     smooth_half: float = 3.0
     order_half: int = 2
-    weak: float = 1e-4
     unseen: float = 3e-4
     rounds: int = 4
     agree: float = 0.93
-    first: float = 1.5
     later: float = 1.0
     erosion: float = 1.5
-    reach: float = 4.0
     ahead: float = np.inf
-
-
-@dataclass(frozen=True, kw_only=True)
-class CloserFitOptions(FitOptions):
-    """The same where the first fit does not hold: closer to the samples, grown step by step.
-
-    A hinge of few blocks' radius is flattened by the smoothing that evens out staircases.  The
-    sheet then runs straight on where the body bends, rejects what lies there, and keeps away
-    from it; so it never reaches the body's ends, which in overturned folds are long wedges.
-    """
-
-    smooth: float = 1.0
-    rough: float = 1.0
-    unseen: float = 1e-4
-    rounds: int = 8
-    later: float = 0.7
-    erosion: float = 0.75
-    ahead: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,25 +215,25 @@ class _System:
 
 
 def _start(
-    medial: MedialSheet, points: Floats, options: FitOptions
+    medial: MedialSheet, points: Floats, settings: FitSettings
 ) -> tuple[_System, MidSurface, Floats]:
     """Return the spline system, the first sheet and the first half thickness."""
     margin = float(np.max(cKDTree(medial.mesh.V).query(points)[0])) + 3
     low, high = medial.uv.min(axis=0) - margin, medial.uv.max(axis=0) + margin
-    grid = SplineGrid.over(low, high, options.knots)
+    grid = SplineGrid.over(low, high, KNOTS)
     bending = grid.energy(2)
-    even_half = (options.smooth_half / options.knots) ** (2 * options.order_half) * (
-        grid.energy(options.order_half)
+    even_half = (settings.smooth_half / KNOTS) ** (2 * settings.order_half) * (
+        grid.energy(settings.order_half)
     )
-    if options.order_half > 2:  # steady slopes are free then, and unlimited past the samples
-        even_half = even_half + options.unseen * bending
-    system = _System(grid, bending, grid.energy(3), even_half, options.unseen)
-    w = density_weights(medial.uv, options.knots) * np.where(medial.trusted, 1.0, options.weak)
+    if settings.order_half > 2:  # steady slopes are free then, and unlimited past the samples
+        even_half = even_half + settings.unseen * bending
+    system = _System(grid, bending, grid.energy(3), even_half, settings.unseen)
+    w = density_weights(medial.uv, KNOTS) * np.where(medial.trusted, 1.0, _WEAK)
     B = grid.basis(medial.uv)
     BtWB = grid.gram(B, w)
-    C = (BtWB + system.stiffness(options.smooth)).solver(RIDGE)(B.T @ (w[:, None] * medial.mesh.V))
+    C = (BtWB + system.stiffness(settings.smooth)).solver(RIDGE)(B.T @ (w[:, None] * medial.mesh.V))
     half = (BtWB + even_half).solver(RIDGE)(B.T @ (w * medial.half))
-    return system, MidSurface(grid, C, low, high, options.cell), half
+    return system, MidSurface(grid, C, low, high, _CELL), half
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +263,7 @@ def _accept(
     samples: HullSamples,
     misfit: float,
     near: Floats,
-    options: FitOptions,
+    settings: FitSettings,
 ) -> _Accepted:
     """Return which samples agree with the sheet so far, by normal and by thickness.
 
@@ -276,14 +277,14 @@ def _accept(
     _, Pu, Pv = sheet.grid.gradient(sheet.C, foot.U)
     predicted = unit(side[:, None] * foot.normal - hu[:, None] * Pu - hv[:, None] * Pv)
     cos = np.einsum("ij,ij->i", samples.normals, predicted)
-    good = (cos > options.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
+    good = (cos > settings.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
     good &= side * samples.side >= 0  # else the sheet has run into another limb
     true_foot = foot.miss < 0.1
-    if np.isfinite(options.ahead):
-        true_foot &= cKDTree(near).query(foot.U)[0] < options.ahead
+    if np.isfinite(settings.ahead):
+        true_foot &= cKDTree(near).query(foot.U)[0] < settings.ahead
     good &= true_foot
     wrong = ~good & true_foot
-    for erosion in (options.erosion, options.erosion / 2, 0.0):
+    for erosion in (settings.erosion, settings.erosion / 2, 0.0):
         keep = good & ~near_any(samples.points, wrong, erosion)
         if 2 * keep.sum() > good.sum():
             break
@@ -302,7 +303,7 @@ def _side_weights(accepted: _Accepted, cell: float) -> Floats:
 
 
 def _refit(
-    system: _System, sheet: MidSurface, accepted: _Accepted, smoothing: float, options: FitOptions
+    system: _System, sheet: MidSurface, accepted: _Accepted, smoothing: float, settings: FitSettings
 ) -> tuple[MidSurface, Floats, Floats, float, float]:
     """Return sheet, half thickness, weights, roughness and smoothing of one round.
 
@@ -311,7 +312,7 @@ def _refit(
     """
     keep = accepted.keep
     U, t, s = accepted.foot.U[keep], accepted.height[keep], accepted.side[keep]
-    w = _side_weights(accepted, options.knots)
+    w = _side_weights(accepted, KNOTS)
     B, H = system.grid.basis(U), system.grid.basis(accepted.flat[keep])
     BtWB = system.grid.gram(B, w)
     surface = BtWB + system.stiffness(smoothing)
@@ -323,15 +324,15 @@ def _refit(
     mid = t - s * (H @ half)
     residual = mid - B @ z[: system.grid.size]
     roughness = float(np.sqrt((w * residual**2).sum() / w.sum()))
-    stretch = np.interp(roughness, [options.quiet, options.loud], [1.0, options.rough])
-    smoothing = options.smooth * float(stretch)
+    stretch = np.interp(roughness, [_QUIET, _LOUD], [1.0, settings.rough])
+    smoothing = settings.smooth * float(stretch)
     points = sheet.at(U) + mid[:, None] * accepted.foot.normal[keep]
     C = (BtWB + system.stiffness(smoothing)).solver(RIDGE)(B.T @ (w[:, None] * points))
     return sheet.with_coefficients(C), half, w, roughness, smoothing
 
 
 def fit_mid_surface(
-    medial: MedialSheet, samples: HullSamples, points: Floats, options: FitOptions
+    medial: MedialSheet, samples: HullSamples, points: Floats, settings: FitSettings
 ) -> FittedSheet:
     """Return the mid surface and half thickness fitted to a hull.
 
@@ -343,30 +344,29 @@ def fit_mid_surface(
         The hull's vertices.
     points : (n, 3) float
         The blocks, which set how far the sheet must reach.
-    options : FitOptions
-        See there.
+    settings : FitSettings
+        How it is fitted.
 
     Raises
     ------
     SplitError
         No sample agrees with the sheet.
     """
-    system, sheet, half = _start(medial, points, options)
+    system, sheet, half = _start(medial, points, settings)
     slip: Floats | None = None
-    near, smoothing = medial.uv, options.smooth
-    for turn in range(options.rounds):
-        foot = sheet.search(near, options.reach).feet(samples.points)
-        misfit = options.first if turn == 0 else options.later
-        accepted = _accept(sheet, half, slip, foot, samples, misfit, near, options)
+    near, smoothing = medial.uv, settings.smooth
+    for turn in range(settings.rounds):
+        foot = sheet.search(near, _REACH).feet(samples.points)
+        misfit = _FIRST if turn == 0 else settings.later
+        accepted = _accept(sheet, half, slip, foot, samples, misfit, near, settings)
         if not accepted.keep.any():
             raise SplitError(
                 "no part of the hull agrees with a smooth sheet; try another --hull, or smaller "
                 "blocks where the body is narrow"
             )
-        sheet, half, w, roughness, smoothing = _refit(system, sheet, accepted, smoothing, options)
+        sheet, half, w, roughness, smoothing = _refit(system, sheet, accepted, smoothing, settings)
         near = accepted.foot.U[accepted.keep]
         slip = slip_potential(sheet, near, w, system.bending)
-    if slip is None:
-        raise ValueError("FitOptions.rounds must be at least 1")
+    assert slip is not None  # there is at least one round
     share = float(accepted.keep.mean())
     return FittedSheet(sheet, half, slip, near, roughness, smoothing, share)

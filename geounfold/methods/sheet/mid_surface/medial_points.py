@@ -27,28 +27,32 @@ from geounfold.surfaces.split.faces import THICKEST
 from geounfold.surfaces.split.result import SurfaceSplit
 
 
-@dataclass(frozen=True, kw_only=True)
-class MedialOptions:
-    """How the trusted core and the parameter domain are cut out of the hull's top.
+CORE = 0.94
+"""Least cosine between a core face's normal and the reversed normal of its opposite face."""
 
-    Lengths in blocks.  ``parallel``: a core face and its opposite face, normals smoothed by
-    ``sweeps`` bilateral passes, must satisfy -N.N' > parallel; ``closing``: width closed in
-    that region; ``island``: least share of its largest part that another part of it has (the
-    tip of an oblique cut is parallel again, by chance); ``erosion``: distance kept from the rim;
-    ``domain``: the flattened domain
-    keeps any face farther than this many median thicknesses from the change of side;
-    ``fair``: least share of a side that the domain should have;
-    ``prefer``: share by which the bottom must be more complete to be flattened for the top.
-    """
+_SWEEPS = 6
+"""Bilateral passes that smooth the face normals before they are compared."""
 
-    parallel: float = 0.94
-    sweeps: int = 6
-    closing: float = 2.5
-    island: float = 0.05
-    erosion: float = 1.5
-    domain: float = 1.2
-    fair: float = 0.5
-    prefer: float = 0.2
+_CLOSING = 2.5
+"""Width of gaps that are closed in the core, in blocks."""
+
+_ISLAND = 0.05
+"""Least share of the core's largest part that another part must have to be kept.
+
+The tip of an oblique cut is parallel to the other side again by chance.
+"""
+
+_EROSION = 1.5
+"""Distance of the core from the rim, in blocks; halved, then dropped, if little would be left."""
+
+_DEEP = 1.2
+"""Distance from the change of side, in median thicknesses, beyond which a face is kept."""
+
+_FAIR = 0.5
+"""Least share of a side's area that is laid flat before the distance from the rim is reduced."""
+
+_MORE_COMPLETE = 0.2
+"""Share of its area by which the bottom must be more complete to be flattened for the top."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +116,7 @@ class _Domain:
 
 
 def _regions(
-    split: SurfaceSplit, normals: Floats, centres: Floats, options: MedialOptions
+    split: SurfaceSplit, normals: Floats, centres: Floats, least: float
 ) -> tuple[Bools, Ints, bool]:
     """Return the trusted core (m,), the faces that are laid flat, and whether they are the top's.
 
@@ -120,13 +124,13 @@ def _regions(
     faces are a fair share of their side.
     """
     area = triangle_areas(split.mesh.V, split.mesh.F)
-    deep = _far_inside(split, centres, options.domain)
-    for erosion in (options.erosion, options.erosion / 2, 0.0):
-        core, away = _core(split, normals, centres, erosion, options)
-        domain = _domain(split, (away | deep) & ~split.beyond, area, options.prefer)
-        if domain is not None and domain.share > options.fair:
+    deep = _far_inside(split, centres)
+    for erosion in (_EROSION, _EROSION / 2, 0.0):
+        core, away = _core(split, normals, centres, erosion, least)
+        domain = _domain(split, (away | deep) & ~split.beyond, area)
+        if domain is not None and domain.share > _FAIR:
             return core, domain.faces, domain.top
-    whole = _domain(split, ~split.beyond, area, options.prefer)
+    whole = _domain(split, ~split.beyond, area)
     if domain is None or (whole is not None and whole.share > 2 * domain.share):
         domain = whole
     if domain is None:
@@ -135,27 +139,27 @@ def _regions(
 
 
 def _core(
-    split: SurfaceSplit, normals: Floats, centres: Floats, erosion: float, options: MedialOptions
+    split: SurfaceSplit, normals: Floats, centres: Floats, erosion: float, least: float
 ) -> tuple[Bools, Bools]:
     """Return the trusted core and the faces away from the rim, (m,) each."""
     away = ~split.rim & ~near_any(centres, split.rim, erosion) if erosion else ~split.rim
     seen = (split.opposite >= 0) & np.isfinite(split.thickness)
     other = normals[np.where(seen, split.opposite, 0)]
     cos = np.where(seen, -np.einsum("ij,ij->i", normals, other), 0.0)
-    closed = near_any(centres, away & (cos > options.parallel), options.closing)
-    core = away & closed & ~near_any(centres, ~closed, options.closing)
-    return _large_parts(core, split.adjacency, options.island), away
+    closed = near_any(centres, away & (cos > least), _CLOSING)
+    core = away & closed & ~near_any(centres, ~closed, _CLOSING)
+    return _large_parts(core, split.adjacency), away
 
 
-def _large_parts(faces: Bools, adjacency: Ints, share: float) -> Bools:
-    """Return faces (m,) without the connected parts of less than a share of the largest's."""
+def _large_parts(faces: Bools, adjacency: Ints) -> Bools:
+    """Return faces (m,) without connected parts much smaller than the largest (`_ISLAND`)."""
     n = len(faces)
     row, column = np.repeat(np.arange(n), 3), adjacency.ravel()
     links = faces[row] & (column >= 0) & faces[column]
     graph = sp.coo_array((np.ones(links.sum()), (row[links], column[links])), (n, n))
     part = connected_components(graph, directed=False)[1]
     size = np.bincount(part, faces)
-    out: Bools = faces & (size >= share * size.max())[part]
+    out: Bools = faces & (size >= _ISLAND * size.max())[part]
     return out
 
 
@@ -181,7 +185,7 @@ def _harmonic_half(
 def medial_sheet(
     split: SurfaceSplit,
     flatten: Callable[[TriMesh, Floats | None], Floats],
-    options: MedialOptions,
+    core: float = CORE,
 ) -> MedialSheet:
     """Return medial points of a split hull, half a thickness below the top, and parameters.
 
@@ -191,8 +195,8 @@ def medial_sheet(
         Hull in working units.
     flatten : callable
         ``flatten(mesh, start)`` -> uv (n, 2), an isometric flattening; start may be None.
-    options : MedialOptions
-        See there.
+    core : float
+        Least cosine between a core face's normal and the reversed normal of its opposite face.
 
     Raises
     ------
@@ -203,10 +207,10 @@ def medial_sheet(
     """
     mesh = split.mesh
     centres = mesh.V[mesh.F].mean(axis=1)
-    normals = bilateral_normals(mesh, split.adjacency, options.sweeps)
-    core, faces, outward = _regions(split, normals, centres, options)
+    normals = bilateral_normals(mesh, split.adjacency, _SWEEPS)
+    trusted_faces, faces, outward = _regions(split, normals, centres, core)
     part, old = mesh.submesh(faces)
-    half, trusted = _harmonic_half(split, part.F, faces, core, len(old))
+    half, trusted = _harmonic_half(split, part.F, faces, trusted_faces, len(old))
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
     medial = TriMesh(part.V - half[:, None] * inward, part.F if outward else part.F[:, ::-1])
@@ -214,10 +218,10 @@ def medial_sheet(
     uv = flatten(medial, None)
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))
-    return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, core, at_vertices)
+    return MedialSheet(medial, _oriented(uv, medial.V), half, trusted, trusted_faces, at_vertices)
 
 
-def _domain(split: SurfaceSplit, inside: Bools, area: Floats, prefer: float) -> _Domain | None:
+def _domain(split: SurfaceSplit, inside: Bools, area: Floats) -> _Domain | None:
     """Return the faces inside that are laid flat; None where there are none.
 
     The top's, unless its largest part leaves out more of it than the bottom's does by some
@@ -230,7 +234,7 @@ def _domain(split: SurfaceSplit, inside: Bools, area: Floats, prefer: float) -> 
             faces = _one_sheet(split.mesh.F, np.flatnonzero(mine & inside))
             share = float(area[faces].sum() / area[mine & ~split.beyond].sum())
             found.append(_Domain(faces, side > 0, share))
-    if len(found) == 2 and found[1].share > found[0].share + prefer:
+    if len(found) == 2 and found[1].share > found[0].share + _MORE_COMPLETE:
         return found[1]
     return found[0] if found else None
 
@@ -250,7 +254,7 @@ def _one_sheet(F: Ints, faces: Ints) -> Ints:
     raise SplitError("the top is no surface: every part of it is pinched; try another --hull")
 
 
-def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
+def _far_inside(split: SurfaceSplit, centres: Floats) -> Bools:
     """Return the faces farther than some median thicknesses from the change of side.
 
     Not those whose ray missed the other side: ends of limbs that meet look along them.
@@ -261,7 +265,7 @@ def _far_inside(split: SurfaceSplit, centres: Floats, domain: float) -> Bools:
         return np.ones(len(centres), dtype=bool)
     distance = cKDTree(centres[change]).query(centres)[0]
     near_side = split.thickness <= THICKEST * split.median_thickness
-    return np.asarray(near_side & (distance > domain * split.median_thickness))
+    return np.asarray(near_side & (distance > _DEEP * split.median_thickness))
 
 
 def _oriented(uv: Floats, V: Floats) -> Floats:

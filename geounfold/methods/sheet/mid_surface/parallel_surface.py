@@ -20,25 +20,20 @@ from geounfold.methods.sheet.mid_surface.spline import density_weights
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, normals, slip_potential
 
 
-@dataclass(frozen=True, kw_only=True)
-class ConformOptions:
-    """When another surface than the mid one is taken for the layers'.
+_VARIED = 0.03
+"""Relative standard deviation of the half thickness below which the mid surface stays."""
 
-    ``varied``: least relative standard deviation of the half thickness; ``strained``: least
-    strain (rms over edges) of the flattened mid surface; ``share``: the other surface's strain
-    must be below this share of it.
-    """
+_STRAINED = 0.002
+"""Strain (rms over edges) of the flattened mid surface below which it stays."""
 
-    varied: float = 0.03
-    strained: float = 0.002
-    share: float = 0.5
+_CLEARLY_LESS = 0.5
+"""Share of the mid surface's strain that the top or the bottom must stay below to be taken."""
 
 
 def conform(
     fitted: FittedSheet,
     medial: MedialSheet,
     flatten: Callable[[TriMesh, Floats], Floats],
-    options: ConformOptions,
 ) -> FittedSheet:
     """Return the sheet moved onto the surface that the layers run parallel to.
 
@@ -50,8 +45,6 @@ def conform(
         Gives the domain that is flattened.
     flatten : callable
         ``flatten(mesh, start)`` -> uv (n, 2).
-    options : ConformOptions
-        See there.
 
     Returns
     -------
@@ -60,7 +53,7 @@ def conform(
     """
     half = fitted.sheet.grid.value(fitted.half, fitted.near)
     level = float(np.median(half))
-    if level <= 0 or float(np.std(half)) < options.varied * level:
+    if level <= 0 or float(np.std(half)) < _VARIED * level:
         return fitted
     limits = (float(half.min()), float(half.max()))
 
@@ -71,10 +64,10 @@ def conform(
         return float(np.sqrt(np.mean((lengths(uv, E) / lengths(V, E) - 1) ** 2)))
 
     middle = strain(0.0)
-    if middle < options.strained:
+    if middle < _STRAINED:
         return fitted
     best, lean = min((strain(side), side) for side in (1.0, -1.0))
-    if best > options.share * middle:
+    if best > _CLEARLY_LESS * middle:
         return fitted
     return _moved(fitted, lean, level, limits)
 

@@ -23,11 +23,27 @@ from geounfold.methods.sheet.mid_surface.spline import density_weights
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, slip_potential
 from geounfold.methods.sheet.sharpening.displace import displacement_basis, node_normals
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites, scatter
-from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, RIM, SiteRules
 from geounfold.methods.sheet.sharpening.site_places import Places
 
 _HOPELESS = 0.03  # blocks: mean depth on the wrong side that cells of merged blocks never mend
 
+
+MISFIT = 0.01
+"""Mean depth of the used sites on the wrong side, in blocks, above which nothing separates them."""
+
+_SMOOTH, _LEAST, _PACE = 2.7, 1.73, 1.15
+"""Smoothing length of the mid surface in blocks: at first, at least, and the factor between.
+
+It is divided by the factor in every round that leaves too many sites on the wrong side.
+"""
+
+_TOLERATED = 0.03  # share of the sites on the wrong side that is not too many
+_ADAPT = 0.06  # margin, in blocks, from which on they are counted
+_SMOOTH_HALF = 3.5  # smoothing length of the half thickness, blocks
+
+_ENOUGH = 100
+"""Sites per coefficient of the sheet up to which all are used if blocks were merged."""
 
 _LEAST_SHARE = 0.1  # of the sites far from the rim that is kept
 
@@ -70,7 +86,7 @@ class _Round:
     depth: float
 
 
-def sharpen(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Separation:
+def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
     """Return the sheet sharpened by lattice sites.
 
     It is none where no smooth pair of surfaces separates the sites: their mean depth on the
@@ -82,19 +98,19 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Separati
         Fit to the hull.
     sites : Sites
         Lattice sites at the body's surface.
-    options : OccupancyOptions
-        See there.
+    rules : SiteRules
+        Which sites are used, and how softly they are separated.
     """
-    fitted, options = _for_thin(fitted, options.for_cells(fitted.unit))
+    fitted, rules = _for_thin(fitted, rules.for_cells(fitted.unit))
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
-    places = Places.of(fitted, sites, options)
+    places = Places.of(fitted, sites, rules)
     rough, fine = grid.energy(4), grid.energy(3)
-    smooth, last = options.smooth, None
+    smooth, last = _SMOOTH, None
     used = fitted.near
-    for k, margin in enumerate(options.margins):
-        depth = options.depths[min(k, len(options.depths) - 1)]
+    for k, margin in enumerate(rules.margins):
+        depth = DEPTHS[min(k, len(DEPTHS) - 1)]
         places.follow(sheet, (half, half), fitted.slip, steps=1 if k else 0)
-        use = places.explained(margin, depth, options)
+        use = places.explained(margin, depth, rules)
         if not len(use):
             return Separation(None, np.inf)
         nodes = node_normals(sheet)
@@ -106,20 +122,20 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Separati
             views,
             margin,
             smooth,
-            options.smooth_half,
+            _SMOOTH_HALF,
             rough,
             fine,
-            options.held,
+            rules.held,
         )
         sheet, half, used = last.sheet, last.half, places.U[use]
         if not np.isfinite(sheet.C).all():
             return Separation(None, np.inf)
-        if k and not options.held and last.depth > _HOPELESS:
+        if k and not rules.held and last.depth > _HOPELESS:
             return Separation(None, last.depth)
-        places.watch(margin, options)
-        if margin <= options.adapt and last.wrong > options.tolerated:
-            smooth = max(smooth / options.pace, options.least)
-    if last is None or last.depth > options.misfit:
+        places.watch(margin)
+        if margin <= _ADAPT and last.wrong > _TOLERATED:
+            smooth = max(smooth / _PACE, _LEAST)
+    if last is None or last.depth > MISFIT:
         return Separation(None, np.inf if last is None else last.depth)
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))
@@ -127,29 +143,29 @@ def sharpen(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Separati
     return Separation(sharper, last.depth)
 
 
-def enough_sites(fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Sites:
+def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:
     """Return as many sites as a sheet fitted to cells of merged blocks can learn from.
 
     Those near the rim and where the layer is thin all stay, as they tell each other's kind; of the
     others an even part.
     """
-    most = options.enough * fitted.sheet.grid.size
+    most = _ENOUGH * fitted.sheet.grid.size
     if fitted.unit <= 1 or len(sites.points) <= most:
         return sites
-    grid, rim = fitted.sheet.grid, 2 * (options.rim + fitted.unit)
+    grid, rim = fitted.sheet.grid, 2 * (RIM + fitted.unit)
     foot = fitted.sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
     flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
     half, seen = grid.value(fitted.half, flat), foot.miss < 0.02
-    inside = seen & (half - np.abs(foot.t) > np.minimum(options.depths[0], 0.6 * half))
+    inside = seen & (half - np.abs(foot.t) > np.minimum(DEPTHS[0], 0.6 * half))
     holes = cKDTree(flat[inside & ~sites.occupied])
-    spare = seen & (half > _THICK * options.thin)
+    spare = seen & (half > _THICK * rules.thin)
     spare[spare] = holes.query(flat[spare], distance_upper_bound=rim)[0] > rim
     share = (most - (~spare).sum()) / max(int(spare.sum()), 1)
     kept = ~spare | (scatter(sites.points) < max(share, _LEAST_SHARE))
     return Sites(sites.points[kept], sites.occupied[kept])
 
 
-def _for_thin(fitted: FittedSheet, options: SiteOptions) -> tuple[FittedSheet, SiteOptions]:
+def _for_thin(fitted: FittedSheet, rules: SiteRules) -> tuple[FittedSheet, SiteRules]:
     """Return fit and options so that sites of a thin sheet are listened to everywhere.
 
     The hull of a thin sheet ends in a wide rim, over which the half thickness was continued;
@@ -157,10 +173,10 @@ def _for_thin(fitted: FittedSheet, options: SiteOptions) -> tuple[FittedSheet, S
     where it pinches out, are left to its rim.
     """
     least = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near))) / 2
-    options = replace(options, thinnest=min(options.thinnest, least))
-    if 2 * least > options.thin:
-        return fitted, replace(options, thin=0.0)
-    return replace(fitted, half=np.maximum(fitted.half, 1.01 * least)), options
+    rules = replace(rules, thinnest=min(rules.thinnest, least))
+    if 2 * least > rules.thin:
+        return fitted, replace(rules, thin=0.0)
+    return replace(fitted, half=np.maximum(fitted.half, 1.01 * least)), rules
 
 
 def _views(sheet: MidSurface, nodes: Floats, places: Places, use: Ints) -> _Views:

@@ -25,23 +25,18 @@ from geounfold.methods.sheet.sharpening.displace import (
 from geounfold.methods.sheet.sharpening.lattice_sites import scatter
 
 
-@dataclass(frozen=True, kw_only=True)
-class LayerOptions:
-    """How layers are found and fitted; lengths in blocks.
+CLEAR = 0.5
+"""Mean cosine of the heights' phase from which points count as lying in layers; 1 is exact."""
 
-    ``clear``: least mean cosine of the heights' phase for layers to be there; ``rounds``: fits
-    with feet found anew; ``smooth``: smoothing lengths tried by cross-validation;
-    ``smooth_half``: least one of the half thickness; ``most``: points used at most.
-    """
+MOST = 12_000
+"""Points used at most."""
 
-    clear: float = 0.5
-    rounds: int = 4
-    smooth: tuple[float, ...] = (1.0, 1.6, 2.4, 3.2)
-    smooth_half: float = 2.0
-    most: int = 12_000
+_ROUNDS = 4  # fits, with feet found anew before each
+_SMOOTH = (1.0, 1.6, 2.4, 3.2)  # smoothing lengths in blocks, chosen among by cross-validation
+_SMOOTH_HALF = 2.0  # least smoothing length of the half thickness, blocks
 
 
-def layer_heights(t: Floats, half: Floats, clear: float) -> Floats | None:
+def layer_heights(t: Floats, half: Floats, clear: float = CLEAR) -> Floats | None:
     """Return the height of each point's layer as a share of the half thickness, (n,).
 
     None where the points are not in layers: for no number m of them is the mean of
@@ -102,7 +97,7 @@ class _Problem:
 
 
 def sharpen_layers(
-    fitted: FittedSheet, points: Floats, options: LayerOptions
+    fitted: FittedSheet, points: Floats, most: int = MOST
 ) -> FittedSheet | None:
     """Return the sheet fitted through all layers of the points, or None where there are none.
 
@@ -112,23 +107,23 @@ def sharpen_layers(
         Fit to the hull.
     points : (n, 3) float
         Blocks, working units.
-    options : LayerOptions
-        See there.
+    most : int
+        Points used at most; an even part of them if there are more.
     """
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
-    if len(points) > options.most:
-        points = points[scatter(points[:, ::-1]) < options.most / len(points)]
+    if len(points) > most:
+        points = points[scatter(points[:, ::-1]) < most / len(points)]
     part = scatter(points) < 0.5
     every = np.ones(len(points), dtype=bool)
     U = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(points).U
     rough, fine = grid.energy(4), grid.energy(3)
-    smooth = options.smooth[len(options.smooth) // 2]
-    for turn in range(options.rounds):
+    smooth = _SMOOTH[len(_SMOOTH) // 2]
+    for turn in range(_ROUNDS):
         foot = follow_feet(sheet, points, U, steps=1)
         U = foot.U
         flat = U - foot.t[:, None] * grid.value(fitted.slip, U)
         thickness = np.maximum(grid.value(half, flat), 0.2)
-        level = layer_heights(foot.t, thickness, options.clear)
+        level = layer_heights(foot.t, thickness, CLEAR)
         if level is None:
             return None
         nodes = node_normals(sheet)
@@ -147,11 +142,11 @@ def sharpen_layers(
         )
         if turn == 1:
             left = [
-                problem.left(*problem.solve(s, options.smooth_half, part), ~part)
-                for s in options.smooth
+                problem.left(*problem.solve(s, _SMOOTH_HALF, part), ~part)
+                for s in _SMOOTH
             ]
-            smooth = options.smooth[int(np.argmin(left))]
-        z, d = problem.solve(smooth, options.smooth_half, every)
+            smooth = _SMOOTH[int(np.argmin(left))]
+        z, d = problem.solve(smooth, _SMOOTH_HALF, every)
         sheet, half = sheet.with_coefficients(sheet.C + nodes * z[:, None]), half + d
         roughness = float(np.sqrt(problem.left(z, d, every)))
     slip = slip_potential(sheet, U, density_weights(U, grid.step), grid.energy(2))

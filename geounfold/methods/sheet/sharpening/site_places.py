@@ -13,7 +13,14 @@ from geounfold.methods.sheet.mid_surface.spline import SplineGrid
 from geounfold.methods.sheet.mid_surface.surface import MidSurface
 from geounfold.methods.sheet.sharpening.displace import follow_feet
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites
-from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_rules import (
+    BAND,
+    COVER,
+    RIM,
+    SLACK,
+    TAPER,
+    SiteRules,
+)
 
 
 def clearance(margin: float) -> float:
@@ -44,7 +51,7 @@ class Places:
     slope: Floats
 
     @classmethod
-    def of(cls, fitted: FittedSheet, sites: Sites, options: SiteOptions) -> Places:
+    def of(cls, fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Places:
         """Return the sites with a foot on a sheet, the rest to be found by `follow`.
 
         Blocks near both horizons are there twice.
@@ -53,7 +60,7 @@ class Places:
         foot = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
         seen = foot.miss < 0.02
         across = np.abs(foot.t) + sheet.grid.value(fitted.half, foot.U)
-        twice = across < clearance(options.margins[0]) + options.slack
+        twice = across < clearance(rules.margins[0]) + SLACK
         rows = np.concatenate([np.flatnonzero(seen), np.flatnonzero(seen & twice & sites.occupied)])
         n = len(rows)
         farther = np.arange(n) >= int(seen.sum())
@@ -101,40 +108,40 @@ class Places:
             0.0 if top is bottom else grid.value((top - bottom) / 2, self.flat[rows])
         )
 
-    def watch(self, margin: float, options: SiteOptions) -> None:
+    def watch(self, margin: float) -> None:
         """Watch only sites that may be used, or mark the rim, with this margin or a smaller one."""
-        near = self.right[self.watched] < clearance(margin) + options.slack
+        near = self.right[self.watched] < clearance(margin) + SLACK
         self.watched = self.watched[near]
 
-    def explained(self, margin: float, depth: float, options: SiteOptions) -> Ints:
+    def explained(self, margin: float, depth: float, rules: SiteRules) -> Ints:
         """Return the sites that a horizon explains, not the rim (indices).
 
         An empty site well inside the layer lies beyond the rim, and so do those around it; where
         the layer tapers steeply, horizon and rim are one.
         """
         beyond, thickness = self.beyond, self.half
-        hole = self.holes(depth, options)
-        good = (self.right < clearance(margin)) & (np.abs(beyond) < max(options.band, 4 * margin))
-        good &= (thickness > options.thinnest) & (self.taper < options.taper)
+        hole = self.holes(depth, rules)
+        good = (self.right < clearance(margin)) & (np.abs(beyond) < max(BAND, 4 * margin))
+        good &= (thickness > rules.thinnest) & (self.taper < TAPER)
         use = np.flatnonzero(good)
-        wide = options.rim * np.hypot(1.0, options.sheared * self.slope[use])
-        most = float(wide.max(initial=options.rim))
+        wide = RIM * np.hypot(1.0, rules.sheared * self.slope[use])
+        most = float(wide.max(initial=RIM))
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=most)[0]
         out: Ints = use[rim > wide]
         return out
 
-    def holes(self, depth: float, options: SiteOptions) -> Bools:
+    def holes(self, depth: float, rules: SiteRules) -> Bools:
         """Return which empty sites lie well inside the layer, (n,): past its rim."""
         deep = -self.beyond > np.minimum(depth, 0.6 * self.half)
-        deep &= ~self.sites.occupied & (self.half > options.thin)
-        return deep | self._uncovered(options)
+        deep &= ~self.sites.occupied & (self.half > rules.thin)
+        return deep | self._uncovered(rules)
 
-    def _uncovered(self, options: SiteOptions) -> Bools:
+    def _uncovered(self, rules: SiteRules) -> Bools:
         """Return which empty sites lie in a thin layer where no block is near, (n,)."""
         beyond, occupied = self.beyond, self.sites.occupied
-        out: Bools = ~occupied & (beyond < 0) & (self.half <= options.thin)
+        out: Bools = ~occupied & (beyond < 0) & (self.half <= rules.thin)
         if out.any():
             blocks = self.flat[occupied & (beyond < 0.5)]
-            near = cKDTree(blocks).query(self.flat[out], distance_upper_bound=options.cover)[0]
-            out[out] = near > options.cover
+            near = cKDTree(blocks).query(self.flat[out], distance_upper_bound=COVER)[0]
+            out[out] = near > COVER
         return out

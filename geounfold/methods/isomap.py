@@ -16,8 +16,8 @@ from geounfold.geometry.measures import vertex_normals
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 from geounfold.methods.contract import BodyFit, Placed, PreparedBody, by_rule
 from geounfold.methods.sheet.meshing.build import register
-from geounfold.methods.sheet.stages import sheet_stages
 from geounfold.methods.sheet.result import SheetResult
+from geounfold.methods.sheet.stages import sheet_stages
 
 _TIE = 1e-6  # of a distance: neighbours this equally far are all taken or all left
 _SPARE = 24  # neighbours asked for beyond those wanted, for ties

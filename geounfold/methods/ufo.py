@@ -9,8 +9,8 @@ import numpy as np
 from geounfold.geometry.mesh import Floats, TetMesh, TriMesh
 from geounfold.mapping.control_mesh import ControlMesh, Datum
 from geounfold.methods.contract import BodyFit, PreparedBody, SurfacePair
-from geounfold.methods.sheet.stages import sheet_stages
 from geounfold.methods.sheet.result import SheetResult
+from geounfold.methods.sheet.stages import sheet_stages
 
 
 @dataclass(frozen=True, eq=False)

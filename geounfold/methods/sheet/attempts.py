@@ -184,6 +184,9 @@ class Trial:
         }
 
 
+_RULES = SiteRules()
+
+
 @dataclass(frozen=True)
 class Attempt:
     """One way of fitting the mid surface.
@@ -203,7 +206,7 @@ class Attempt:
 
     name: str
     fit: Callable[[Case], FittedSheet | None]
-    rules: SiteRules = SiteRules()
+    rules: SiteRules = _RULES
     needs_contradiction: bool = False
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geounfold.body.merged_blocks import CoarseOptions
+from geounfold.errors import check_number, check_whole
 from geounfold.methods.sheet.meshing.build import CELL
 from geounfold.methods.sheet.mid_surface.fit import SMOOTH
 from geounfold.methods.sheet.mid_surface.medial_points import CORE
@@ -32,3 +32,9 @@ class SheetOptions:
     core: float = CORE
     mesh_cell: float = CELL
     merge_above: int = 60_000
+
+    def __post_init__(self) -> None:
+        check_number("sheet_options.smoothing", self.smoothing, 0, low_open=True)
+        check_number("sheet_options.core", self.core, 0, 1)
+        check_number("sheet_options.mesh_cell", self.mesh_cell, 0, low_open=True)
+        check_whole("sheet_options.merge_above", self.merge_above, 1)

@@ -24,9 +24,8 @@ from geounfold.methods.sheet.mid_surface.spline import SplineGrid, density_weigh
 from geounfold.methods.sheet.mid_surface.surface import near_any
 from geounfold.methods.sheet.sharpening.by_lattice_sites import separating_step
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites
-from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, SiteRules
 from geounfold.methods.sheet.sharpening.site_places import Places
-
+from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, SiteRules
 
 _SMOOTH = 1.5
 """Smoothing length of the heights, in blocks."""
@@ -101,9 +100,7 @@ class Horizons:
         return found[0], np.maximum(found[1], found[0] + 0.3)
 
 
-def fit_horizons(
-    fitted: FittedSheet, samples: HullSamples, knots: float
-) -> Horizons:
+def fit_horizons(fitted: FittedSheet, samples: HullSamples, knots: float) -> Horizons:
     """Return the height fields of top and bottom fitted to the hull (see Horizons)."""
     sheet, grid = fitted.sheet, fitted.sheet.grid
     foot = sheet.search().feet(samples.points)
@@ -157,9 +154,7 @@ def separate_horizons(
     grid = fitted.sheet.grid
     nodes, _ = fitted.sheet.samples()
     held = grid.gram(grid.basis(nodes), np.ones(len(nodes)))
-    still = (_SEPARATE * fitted.unit / grid.step) ** 4 * grid.energy(
-        2
-    ) + _STIFFNESS * held
+    still = (_SEPARATE * fitted.unit / grid.step) ** 4 * grid.energy(2) + _STIFFNESS * held
     sharp = [fitted.reach(side, fitted.half) for side in (1.0, -1.0)]
     trust = np.clip(fitted.half / fitted.unit - _BLURRED, 0.0, 1.0)
     start = (

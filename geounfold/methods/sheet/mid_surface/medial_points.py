@@ -26,7 +26,6 @@ from geounfold.methods.sheet.mid_surface.surface import near_any
 from geounfold.surfaces.split.faces import THICKEST
 from geounfold.surfaces.split.result import SurfaceSplit
 
-
 CORE = 0.94
 """Least cosine between a core face's normal and the reversed normal of its opposite face."""
 

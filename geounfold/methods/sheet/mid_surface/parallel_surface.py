@@ -8,7 +8,7 @@ own was flat once, and flattens with the least strain.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from geounfold.methods.sheet.mid_surface.fit import FittedSheet
 from geounfold.methods.sheet.mid_surface.medial_points import MedialSheet
 from geounfold.methods.sheet.mid_surface.spline import density_weights
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, normals, slip_potential
-
 
 _VARIED = 0.03
 """Relative standard deviation of the half thickness below which the mid surface stays."""

@@ -23,14 +23,11 @@ from geounfold.methods.sheet.mid_surface.spline import density_weights
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, slip_potential
 from geounfold.methods.sheet.sharpening.displace import displacement_basis, node_normals
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites, scatter
-from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, RIM, SiteRules
 from geounfold.methods.sheet.sharpening.site_places import Places
+from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, RIM, SiteRules
 
 _HOPELESS = 0.03  # blocks: mean depth on the wrong side that cells of merged blocks never mend
 
-
-MISFIT = 0.01
-"""Mean depth of the used sites on the wrong side, in blocks, above which nothing separates them."""
 
 _SMOOTH, _LEAST, _PACE = 2.7, 1.73, 1.15
 """Smoothing length of the mid surface in blocks: at first, at least, and the factor between.
@@ -67,13 +64,30 @@ class _Views:
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """A sheet moved to separate the sites, or None where no smooth one does.
+    """A sheet moved to separate blocks from empty sites.
 
-    ``depth``: mean depth of the used sites on the wrong side, blocks; inf where none was used.
+    Attributes
+    ----------
+    sheet : FittedSheet or None
+        None if no site could be used, or if the steps did not lead towards a separation.
+    depth : float
+        Mean depth of the used sites on the wrong side, in blocks; infinite if none was used.
     """
 
     sheet: FittedSheet | None
     depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Energy:
+    """What the separation keeps small besides the sites on the wrong side.
+
+    ``rough``, ``fine``: fourth and third differences of coefficients; ``held``: as in SiteRules.
+    """
+
+    rough: Stencils
+    fine: Stencils
+    held: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +101,7 @@ class _Round:
 
 
 def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
-    """Return the sheet sharpened by lattice sites.
-
-    It is none where no smooth pair of surfaces separates the sites: their mean depth on the
-    wrong side is above ``misfit``.
+    """Return the sheet moved until the lattice sites lie on their own sides of its horizons.
 
     Parameters
     ----------
@@ -104,7 +115,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
     fitted, rules = _for_thin(fitted, rules.for_cells(fitted.unit))
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     places = Places.of(fitted, sites, rules)
-    rough, fine = grid.energy(4), grid.energy(3)
+    energy = _Energy(grid.energy(4), grid.energy(3), rules.held)
     smooth, last = _SMOOTH, None
     used = fitted.near
     for k, margin in enumerate(rules.margins):
@@ -115,18 +126,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
             return Separation(None, np.inf)
         nodes = node_normals(sheet)
         views = _views(sheet, nodes, places, use)
-        last = _step(
-            sheet,
-            half,
-            nodes,
-            views,
-            margin,
-            smooth,
-            _SMOOTH_HALF,
-            rough,
-            fine,
-            rules.held,
-        )
+        last = _step(sheet, half, nodes, views, (margin, smooth), energy)
         sheet, half, used = last.sheet, last.half, places.U[use]
         if not np.isfinite(sheet.C).all():
             return Separation(None, np.inf)
@@ -135,8 +135,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
         places.watch(margin)
         if margin <= _ADAPT and last.wrong > _TOLERATED:
             smooth = max(smooth / _PACE, _LEAST)
-    if last is None or last.depth > MISFIT:
-        return Separation(None, np.inf if last is None else last.depth)
+    assert last is not None  # there is at least one margin
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))
     sharper = replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
@@ -191,12 +190,8 @@ def _step(
     half: Floats,
     nodes: Floats,
     views: _Views,
-    margin: float,
-    smooth: float,
-    smooth_half: float,
-    rough: Stencils,
-    fine: Stencils,
-    held: bool,
+    lengths: tuple[float, float],
+    energy: _Energy,
 ) -> _Round:
     """Take one Newton step in the surface, then one in the half thickness.
 
@@ -205,13 +200,15 @@ def _step(
     of the moved surface (weight (smooth / knots)^8) and the third of the half thickness.
     """
     knots = sheet.grid.step
+    margin, smooth = lengths
+    rough, held = energy.rough, energy.held
     stiff = (smooth / knots) ** 8
     pull = np.einsum("ij,ij->i", nodes, rough @ sheet.C)
     m = views.height - views.H @ half
     stiffness = stiff * rough.between(nodes)
     z = separating_step(views.A, m, views.occupied, margin, knots, stiffness, stiff * pull, held)
     m = m - views.A @ z
-    even = (smooth_half / knots) ** 6 * fine
+    even = (_SMOOTH_HALF / knots) ** 6 * energy.fine
     dh = separating_step(views.H, m, views.occupied, margin, knots, even, even @ half, held)
     m = m - views.H @ dh
     wrong = np.where(views.occupied, m, -m)

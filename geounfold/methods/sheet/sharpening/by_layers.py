@@ -24,7 +24,6 @@ from geounfold.methods.sheet.sharpening.displace import (
 )
 from geounfold.methods.sheet.sharpening.lattice_sites import scatter
 
-
 CLEAR = 0.5
 """Mean cosine of the heights' phase from which points count as lying in layers; 1 is exact."""
 
@@ -96,9 +95,7 @@ class _Problem:
         return float(np.mean(rest**2))
 
 
-def sharpen_layers(
-    fitted: FittedSheet, points: Floats, most: int = MOST
-) -> FittedSheet | None:
+def sharpen_layers(fitted: FittedSheet, points: Floats, most: int = MOST) -> FittedSheet | None:
     """Return the sheet fitted through all layers of the points, or None where there are none.
 
     Parameters
@@ -141,10 +138,7 @@ def sharpen_layers(
             len(np.unique(level)),
         )
         if turn == 1:
-            left = [
-                problem.left(*problem.solve(s, _SMOOTH_HALF, part), ~part)
-                for s in _SMOOTH
-            ]
+            left = [problem.left(*problem.solve(s, _SMOOTH_HALF, part), ~part) for s in _SMOOTH]
             smooth = _SMOOTH[int(np.argmin(left))]
         z, d = problem.solve(smooth, _SMOOTH_HALF, every)
         sheet, half = sheet.with_coefficients(sheet.C + nodes * z[:, None]), half + d

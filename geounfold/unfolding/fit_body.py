@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from geounfold.body.merged_blocks import CoarseOptions, merged, merges
+from geounfold.body.merged_blocks import merge_blocks, merge_sizes
 from geounfold.body.prepare import BodyPoints
 from geounfold.body.scattered import scattered
 from geounfold.body.working_frame import Frame
@@ -71,16 +71,16 @@ _TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoShe
 def _merges(
     points: Floats, frame: Frame, options: UnfoldOptions, reference: object
 ) -> tuple[int, ...]:
-    """Return how many blocks to merge along a cell's side, the most first (see merges).
+    """Return how many blocks to merge along a cell's side, the most first (see merge_sizes).
 
     Scattered points are not merged: the share of such a cell that is full is not known.
     """
-    chosen = CoarseOptions(blocks=options.sheet_options.merge_above)
-    if reference is not None or options.method != "sheet" or len(points) <= chosen.blocks:
+    above = options.sheet_options.merge_above
+    if reference is not None or options.method != "sheet" or len(points) <= above:
         return ()
     if frame.steps is None and scattered(points):
         return ()
-    return merges(points, frame.steps, chosen)
+    return merge_sizes(points, frame.steps, above)
 
 
 def _fit_at(
@@ -96,7 +96,7 @@ def _fit_at(
     if reference is None:
         with stage("hull"):
             name = method.hull if options.hull == "auto" else options.hull
-            coarse = merged(points, frame.steps, merge) if merge > 1 else None
+            coarse = merge_blocks(points, frame.steps, merge) if merge > 1 else None
             cells, share = (points, None) if coarse is None else (coarse.points, coarse.share)
             hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
         with stage("split"):

@@ -233,9 +233,7 @@ def options_of(mesh):
     chosen = UnfoldOptions(allow_uncertified=True)
     if mesh == "thesis":
         return replace(chosen, method="thesis")
-    sheet = chosen.sheet_options
-    control = replace(sheet.control, cell=float(mesh))
-    return replace(chosen, sheet_options=replace(sheet, control=control))
+    return replace(chosen, sheet_options=replace(chosen.sheet_options, mesh_cell=float(mesh)))
 
 
 def rows_of(name, mesh, rounds):

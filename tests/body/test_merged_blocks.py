@@ -65,7 +65,7 @@ def test_blocks_are_merged_as_far_as_surface_and_thickness_allow(changes, expect
 
 
 def test_options_are_checked():
-    with pytest.raises(OptionError, match="merge_above must be 1 or more blocks, but is 0"):
+    with pytest.raises(OptionError, match="merge_above must be a whole number"):
         SheetOptions(merge_above=0)
 
 

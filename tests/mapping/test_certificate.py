@@ -10,7 +10,7 @@ from geounfold.geometry.prisms import prism_tets
 from geounfold.mapping.certificate import Gluing, certify, examine
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.sheet.meshing import build
-from geounfold.methods.sheet.meshing.build import ControlOptions
+from geounfold.methods.sheet.meshing.build import MeshPlan
 from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS
 from tests.shapes import slab
 
@@ -134,12 +134,12 @@ def test_upright_prisms_may_overlap_at_an_inner_hinge():
     body = gu.simulate("sharp_hinge")
     u = gu.unfold(body.folded)
     assert u.certificate.injective
-    fit, options = u.fits[0].sheet, ControlOptions()
+    fit = u.fits[0].sheet
     points = np.ascontiguousarray(u.frame.to_work(body.folded))
     foot = build.block_feet(fit.fitted, points, reach=10.0)
-    columns = build._columns(fit.fitted, fit.horizons, foot, None, _laid_flat, options, "mid")
-    caps = build._focal_caps(columns.curvature[:, : columns.count], options.focal)
-    layers = columns.layers(build._offsets(columns, foot, caps, options), FRACTIONS)
+    columns = build._columns(fit.fitted, fit.horizons, foot, None, MeshPlan(_laid_flat))
+    caps = build._focal_caps(columns.curvature[:, : columns.count], build._FOCAL)
+    layers = columns.layers(build._offsets(columns, foot, caps), FRACTIONS)
     V, T = layers.folded, layers.tets()
     assert (tet_volumes(V, T) > 0).all()
     assert (tet_volumes(layers.unfolded, T) > 0).all()

@@ -12,8 +12,7 @@ import geounfold as gu
 from geounfold.errors import ControlMeshError, InputError, OptionError
 from geounfold.geometry.measures import tet_volumes
 from geounfold.methods import METHODS
-from geounfold.methods.sheet.meshing.build import ControlOptions
-from geounfold.methods.sheet.options import SheetOptions
+from geounfold.methods.sheet.meshing import build
 from geounfold.synthetic import simulate
 from geounfold.unfolding import measured
 
@@ -242,12 +241,13 @@ def test_torn_blocks_are_an_error_unless_allowed(swelling, monkeypatch):
     assert any("torn" in w for w in u.summary()["warnings"])
 
 
-def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling):
+def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling, monkeypatch):
     # A control mesh two blocks short of the body's top and bottom, and nothing around it.
-    short = SheetOptions(control=ControlOptions(pad=-2.0, pad_capped=-2.0))
+    monkeypatch.setattr(build, "PAD", -2.0)
+    monkeypatch.setattr(build, "PAD_CAPPED", -2.0)
     with pytest.raises(ControlMeshError, match=r"lie outside the control mesh.*around"):
-        gu.unfold(swelling, reach=0.0, sheet_options=short)
-    u = gu.unfold(swelling, reach=0.0, sheet_options=short, allow_uncertified=True)
+        gu.unfold(swelling, reach=0.0)
+    u = gu.unfold(swelling, reach=0.0, allow_uncertified=True)
     empty = u.location == "outside"
     assert 0.02 < empty.mean() < 0.5  # more than tents are raised over; some of nine layers
     assert np.isnan(u.points[empty]).all()
@@ -256,7 +256,7 @@ def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling):
     assert u.summary()["outside"]["empty"] == empty.sum()
     assert any("left empty" in w for w in u.summary()["warnings"])
     # The same with a shell: every block has a place.
-    assert (gu.unfold(swelling, sheet_options=short).location != "outside").all()
+    assert (gu.unfold(swelling).location != "outside").all()
 
 
 def test_the_thesis_method_reaches_its_figures():

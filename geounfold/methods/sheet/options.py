@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from geounfold.body.merged_blocks import MERGE_ABOVE
 from geounfold.errors import check_number, check_whole
 from geounfold.methods.sheet.meshing.build import CELL
 from geounfold.methods.sheet.mid_surface.fit import SMOOTH
@@ -31,7 +32,7 @@ class SheetOptions:
     smoothing: float = SMOOTH
     core: float = CORE
     mesh_cell: float = CELL
-    merge_above: int = 60_000
+    merge_above: int = MERGE_ABOVE
 
     def __post_init__(self) -> None:
         check_number("sheet_options.smoothing", self.smoothing, 0, low_open=True)

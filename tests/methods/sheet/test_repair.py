@@ -13,7 +13,7 @@ from geounfold.geometry.prisms import prism_tets
 from geounfold.geometry.untangle import _Problem, _rest_shapes, untangle
 from geounfold.mapping.certificate import Gluing, examine
 from geounfold.methods.sheet.meshing import build
-from geounfold.methods.sheet.meshing.build import ControlOptions
+from geounfold.methods.sheet.meshing.build import MeshPlan
 from geounfold.methods.sheet.meshing.footprint import footprint
 from geounfold.methods.sheet.meshing.prism_layers import FRACTIONS, bounded_slope
 from geounfold.methods.sheet.meshing.repair import climb
@@ -96,14 +96,14 @@ def plunging():
 
 
 def columns_of(u):
-    fit, options = u.fits[0].sheet, ControlOptions(shell=0.0)
+    fit = u.fits[0].sheet
     points = np.ascontiguousarray(u.frame.to_work(u.folded))
     foot = build.block_feet(fit.fitted, points, reach=10.0)
 
     def flat(mesh: TriMesh, start):
         return gu.flatten(mesh, "spring", start=start)
 
-    return build._columns(fit.fitted, fit.horizons, foot, None, flat, options, "mid"), points
+    return build._columns(fit.fitted, fit.horizons, foot, None, MeshPlan(flat, shell=0.0)), points
 
 
 def test_tents_hold_blocks_just_outside_and_stay_proved(plunging):

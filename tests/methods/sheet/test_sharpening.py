@@ -1,22 +1,22 @@
 """Lattice sites and layers: what they say, and that a sheet listens."""
 
-from dataclasses import asdict
 from itertools import product
 
 import numpy as np
 import pytest
 
 import geounfold as gu
-from geounfold.methods.sheet.mid_surface.fit import CloserFitOptions, FitOptions
-from geounfold.methods.sheet.mid_surface.parallel_surface import ConformOptions
+from geounfold.methods.sheet import attempts
+from geounfold.methods.sheet.attempts import HOLDS
+from geounfold.methods.sheet.mid_surface import parallel_surface
 from geounfold.methods.sheet.mid_surface.spline import SplineGrid
 from geounfold.methods.sheet.mid_surface.surface import MidSurface
-from geounfold.methods.sheet.options import SheetOptions
+from geounfold.methods.sheet.sharpening import by_layers
 from geounfold.methods.sheet.sharpening.by_lattice_sites import sharpen
-from geounfold.methods.sheet.sharpening.by_layers import LayerOptions, layer_heights, sharpen_layers
+from geounfold.methods.sheet.sharpening.by_layers import layer_heights, sharpen_layers
 from geounfold.methods.sheet.sharpening.displace import displacement_basis, node_normals
 from geounfold.methods.sheet.sharpening.lattice_sites import scatter, surface_sites
-from geounfold.methods.sheet.sharpening.site_options import SiteOptions
+from geounfold.methods.sheet.sharpening.site_rules import SiteRules
 from geounfold.synthetic import simulate
 
 
@@ -85,9 +85,11 @@ def test_scatter_is_even():
 def lattice_fit():
     """A lattice body, its truth and its sheet before and after."""
     body = simulate("plunging", blocks=12000)
-    once = CloserFitOptions(**asdict(FitOptions()))  # fitted again as at first
-    never = SheetOptions(occupancy=SiteOptions(misfit=-1.0), closer=once)
-    return body, gu.unfold(body.folded, sheet_options=never), gu.unfold(body.folded)
+    with pytest.MonkeyPatch.context() as patch:  # no attempt holds, and none is a closer fit
+        patch.setattr(attempts, "HOLDS", -1.0)
+        patch.setattr(attempts, "ATTEMPTS", attempts.ATTEMPTS[:2])
+        before = gu.unfold(body.folded)
+    return body, before, gu.unfold(body.folded)
 
 
 def test_sites_bring_the_sheet_nearer_to_the_truth(lattice_fit):
@@ -106,15 +108,17 @@ def test_sites_that_no_sheet_separates_are_refused(lattice_fit):
     points = after.frame.snap(after.frame.to_work(after.folded))
     steps = after.frame.steps
     sites = surface_sites(np.rint(points / steps).astype(np.int64), steps)
-    assert sharpen(fitted, sites, SiteOptions()).sheet is not None
+    assert sharpen(fitted, sites, SiteRules()).depth < HOLDS
     mixed = type(sites)(sites.points, rng.permutation(sites.occupied))
-    assert sharpen(fitted, mixed, SiteOptions()).sheet is None
+    assert sharpen(fitted, mixed, SiteRules()).depth > 10 * HOLDS
 
 
 def test_layers_bring_a_folded_grid_nearer_to_the_truth():
     body = simulate("sim_case_2")
-    never = SheetOptions(layers=LayerOptions(clear=2.0))
-    before, after = gu.unfold(body.folded, sheet_options=never), gu.unfold(body.folded)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(by_layers, "CLEAR", 2.0)  # never met
+        before = gu.unfold(body.folded)
+    after = gu.unfold(body.folded)
     assert (before.fits[0].notes["sharpened"], after.fits[0].notes["sharpened"]) == ("", "layers")
     off = [gu.aligned_rms(u.points, body.truth) / u.frame.scale for u in (before, after)]
     # Measured 0.075 before and 0.009 after.
@@ -124,7 +128,7 @@ def test_layers_bring_a_folded_grid_nearer_to_the_truth():
 def test_more_points_than_asked_for_are_thinned_evenly():
     u = gu.unfold(simulate("sim_case_1").folded)
     fitted, work = u.fits[0].sheet.fitted, u.frame.to_work(u.folded)
-    all_, some = (sharpen_layers(fitted, work, LayerOptions(most=most)) for most in (10**6, 8000))
+    all_, some = (sharpen_layers(fitted, work, most) for most in (10**6, 8000))
     U = fitted.near
     # Both fits go through the same layers: measured 0.00003 blocks apart.
     assert np.abs(all_.sheet.at(U) - some.sheet.at(U)).max() < 0.001
@@ -132,8 +136,10 @@ def test_more_points_than_asked_for_are_thinned_evenly():
 
 def test_layers_follow_the_side_that_does_not_bulge():
     body = simulate("bulge", blocks=15000)
-    never = SheetOptions(conform=ConformOptions(share=0.0))
-    middle, chosen = gu.unfold(body.folded, sheet_options=never), gu.unfold(body.folded)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(parallel_surface, "_CLEARLY_LESS", 0.0)  # the mid surface stays
+        middle = gu.unfold(body.folded)
+    chosen = gu.unfold(body.folded)
     flat = "bottom" if np.ptp(body.bottom) < np.ptp(body.top) else "top"
     assert (middle.fits[0].notes["layers_follow"], chosen.fits[0].notes["layers_follow"]) == (
         "mid",

@@ -5,8 +5,8 @@ import pytest
 
 import geounfold as gu
 from geounfold.errors import SplitError
-from geounfold.methods.sheet.mid_surface.fit import FitOptions
-from geounfold.methods.sheet.stages import _tried
+from geounfold.methods.sheet import attempts
+from geounfold.methods.sheet.mid_surface.fit import FitSettings
 from geounfold.synthetic import Body, random_body
 
 
@@ -40,13 +40,14 @@ def test_ends_of_limbs_that_come_close_do_not_bend_the_sheet() -> None:
     assert rms < 0.25
 
 
-def test_another_fit_that_fails_leaves_the_first() -> None:
-    def fails(_: FitOptions) -> object:
-        raise SplitError("no part of the hull agrees with a smooth sheet")
+def test_another_fit_that_fails_leaves_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = attempts.Case(*[None] * 6, judged=True, smoothing=2.2)  # type: ignore[arg-type]
+    raised: list[Exception] = [SplitError("no part of the hull agrees"), ValueError("other")]
 
-    def breaks(_: FitOptions) -> object:
-        raise ValueError("anything else")
+    def fails(*_: object) -> None:
+        raise raised.pop(0)
 
-    assert _tried(fails, FitOptions()) is None  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="anything else"):
-        _tried(breaks, FitOptions())  # type: ignore[arg-type]
+    monkeypatch.setattr(attempts, "fit_mid_surface", fails)
+    assert case.tried(FitSettings()) is None
+    with pytest.raises(ValueError, match="other"):
+        case.tried(FitSettings())

@@ -1,4 +1,4 @@
-"""Blocks as boxes: which of them holds a point, and the points that stand for one."""
+"""Blocks as boxes of given sizes: the block that holds a point, and regular grids of blocks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from geounfold.geometry.measures import sorted_distinct
 from geounfold.geometry.mesh import Floats, Ints
 
 ROUNDING = 1e-6
-"""Share of a block's side by which a point may lie outside: coordinates are written rounded."""
+"""Share of a block's side by which a point may lie outside, because coordinates are rounded."""
 
 MOST_CELLS = 50_000_000
-"""Cells beyond which a regular grid is refused."""
+"""Number of blocks above which a regular grid is refused."""
 
-_SHARING = 4096  # blocks in one place beyond which they are no block model
+_SHARING = 4096  # blocks in one grid cell above which they are no block model
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class BlockModel:
     centroids : (n, 3) float
         World coordinates.
     sizes : (n, 3) float
-        Whole sides along the model's own axes, in the same unit.
+        Sides along the model's own axes, in the same unit.
     axes : (3, 3) float
         The model's own axes as rows, a rotation of the world's.
     """
@@ -65,12 +65,12 @@ class BlockModel:
 
     @cached_property
     def _reference(self) -> Floats:
-        """Return a place amid the blocks: lengths from it are small, whatever the coordinates."""
+        """The middle of the blocks, (3,); coordinates relative to it are small."""
         out: Floats = (self.centroids.min(axis=0) + self.centroids.max(axis=0)) / 2
         return out
 
     def to_own(self, points: Floats) -> Floats:
-        """Return points (m, 3) in the model's own axes, from a place amid the blocks."""
+        """Return points (m, 3) along the model's own axes, relative to the middle of the blocks."""
         out: Floats = (points - self._reference) @ self.axes.T
         return out
 
@@ -82,7 +82,7 @@ class BlockModel:
         split : int
             Parts along each axis.
         rows : slice
-            Which blocks, r of them.
+            Rows of the blocks, r of them.
 
         Returns
         -------
@@ -95,7 +95,7 @@ class BlockModel:
         return out
 
     def locate(self, points: Floats) -> Ints:
-        """Return the row of the block that holds each point, -1 where none does.
+        """Return the row of the block that holds each point; -1 for a point in no block.
 
         Parameters
         ----------
@@ -105,13 +105,13 @@ class BlockModel:
         Returns
         -------
         (m,) int
-            Of several blocks, as on a common face, the one that lies lowest along the model's x
-            axis (then y, z), whatever the order of the rows.
+            If several blocks hold a point, as on a common face, the one lowest along the model's x
+            axis (then y, z), for every order of the rows.
         """
         own = self.to_own(np.asarray(points, dtype=np.float64))
         out = np.full(len(own), len(self), dtype=np.int64)
-        for shelf in self._shelves:
-            out = np.minimum(out, shelf.locate(own))
+        for group in self._size_groups:
+            out = np.minimum(out, group.locate(own))
         found = out < len(self)
         out[found] = self._order[out[found]]
         out[~found] = -1
@@ -119,31 +119,31 @@ class BlockModel:
 
     @cached_property
     def _order(self) -> Ints:
-        """Return the rows from the lowest block along the axes to the highest, (n,)."""
+        """The rows from the lowest block along the axes to the highest, (n,)."""
         out: Ints = np.lexsort(self.to_own(self.centroids).T[::-1])
         return out
 
     @cached_property
-    def _shelves(self) -> list[_Shelf]:
-        """Return the blocks by size: those of one shelf differ at most by a factor two."""
+    def _size_groups(self) -> list[_SizeGroup]:
+        """The blocks by size; sizes in one group differ at most by a factor of two."""
         sizes = self.sizes[self._order]
         centres = self.to_own(self.centroids[self._order])
         level = np.floor(np.log2((sizes.max(axis=0) / sizes).max(axis=1)) + 1e-9).astype(np.int64)
         return [
-            _Shelf(np.flatnonzero(level == k), centres, sizes)
+            _SizeGroup(np.flatnonzero(level == k), centres, sizes)
             for k in sorted_distinct(level).tolist()
         ]
 
 
-class _Shelf:
-    """Blocks of similar size, sorted into the cells of a grid as large as the largest of them.
+class _SizeGroup:
+    """Blocks of similar size, sorted into a grid whose cells are as large as the largest of them.
 
     Parameters
     ----------
     rows : (k,) int
-        Which blocks, ascending.
+        Rows of the blocks, ascending.
     centres, sizes : (n, 3) float
-        Of all blocks, in the model's own axes.
+        Of all blocks, along the model's own axes.
     """
 
     def __init__(self, rows: Ints, centres: Floats, sizes: Floats) -> None:
@@ -167,7 +167,7 @@ class _Shelf:
         )
         if self._count.max() > _SHARING:
             raise InputError(
-                f"{self._count.max()} blocks lie in one place: these are no blocks that fill space"
+                f"{self._count.max()} blocks lie in one place, so they are not blocks of a model"
             )
 
     def _index(self, own: Floats) -> Ints:
@@ -179,7 +179,7 @@ class _Shelf:
         return out
 
     def locate(self, own: Floats) -> Ints:
-        """Return the first block of the shelf that holds each point, their number for none."""
+        """Return the first block of the group that holds each point; len(centres) for none."""
         out = np.full(len(own), len(self._centres), dtype=np.int64)
         index = self._index(own)
         inside = np.flatnonzero(((index >= 0) & (index < self._shape)).all(axis=1))
@@ -207,14 +207,14 @@ def regular_grid(points: Floats, sizes: Floats) -> BlockModel:
     Parameters
     ----------
     points : (n, 3) float
-        What it covers, such as the unfolded blocks; rows with NaN (no image) are passed over.
+        Points to cover, such as the unfolded blocks; rows with NaN (no image) are skipped.
     sizes : (3,) float
         Sides of a block.
 
     Raises
     ------
     InputError
-        Sides that are not positive, no finite point, or more cells than ``MOST_CELLS``.
+        Sides are not positive, no point is finite, or the grid has more than MOST_CELLS blocks.
 
     Examples
     --------
@@ -227,7 +227,9 @@ def regular_grid(points: Floats, sizes: Floats) -> BlockModel:
         raise InputError("a grid's blocks need three positive sides")
     finite = points[np.isfinite(points).all(axis=1)]
     if not len(finite):
-        raise InputError("there is no point with coordinates that a grid could cover")
+        raise InputError(
+            "no point has finite coordinates, so there is nothing to cover with a grid"
+        )
     first = np.floor(finite.min(axis=0) / sides).astype(np.int64)
     count = np.maximum(np.ceil(finite.max(axis=0) / sides).astype(np.int64) - first, 1)
     if np.prod(count.astype(np.float64)) > MOST_CELLS:

@@ -1,11 +1,11 @@
-"""Checks that points can be a body: enough of them, in three directions."""
+"""Checks that points can be a body: enough of them, extended in three directions."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geounfold.body.block_cells import MIXED, SAMPLE, Cells, neighbours
+from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.lattice import (
     Lattice,
     distinct,
@@ -13,29 +13,27 @@ from geounfold.body.lattice import (
     measure_lattice,
     point_spacing,
 )
+from geounfold.body.scattered import nearest_points
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Floats
 
 MIN_POINTS = 50
 """Fewest distinct points of a body: a sheet of 5 x 5 blocks, two thick."""
 
-
 _FLAT = 0.05  # extent, in point spacings, below which points lie on a line or plane
-
-
 _SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
-
-
-_AROUND = 101  # nearest points among which three directions are looked for, itself included
+_AROUND = 101  # nearest points in which three directions are looked for, the point itself included
+_SAMPLE = 2000  # points whose neighbourhoods are looked at
+_MIXED = np.array([1.0, np.sqrt(2) / 2, np.pi / 6])  # different rows hardly ever share a sum
 
 
 def count_duplicates(points: Floats) -> int:
-    """Return how many rows repeat the coordinates of another row.
+    """Return how many rows have the coordinates of an earlier row.
 
     >>> count_duplicates(np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 0, 0]]))
     2
     """
-    key = points[:, 0] * MIXED[0] + points[:, 1] * MIXED[1] + points[:, 2] * MIXED[2]
+    key = points[:, 0] * _MIXED[0] + points[:, 1] * _MIXED[1] + points[:, 2] * _MIXED[2]
     ordered = np.sort(key)
     same = ordered[1:][ordered[1:] == ordered[:-1]]
     if not len(same):  # equal rows have equal keys
@@ -45,21 +43,23 @@ def count_duplicates(points: Floats) -> int:
 
 
 def check_points(points: Floats, lattice: Lattice | None = None) -> None:
-    """Raise unless the points fill a body that can have a top and a bottom.
+    """Raise InputError unless the points fill a body that can have a top and a bottom.
+
+    A folded sheet one block thick is valid on a lattice, because its blocks have a top and a
+    bottom.
 
     Parameters
     ----------
     points : (n, 3) float
         Finite world coordinates; duplicates are allowed.
     lattice : Lattice, optional
-        Theirs, where the caller has measured it; measured here when left out.
+        The points' lattice; measured here by default.
 
     Raises
     ------
     InputError
-        Too few distinct points; all in one column, on a line or in a plane; or all on one
-        surface and not on a lattice.  A folded sheet of one layer of blocks has a top and a
-        bottom, as its blocks have.
+        The distinct points are too few, all in one column, on one line or in one plane, or all on
+        one surface and on no lattice.
     """
     count = len(points) - count_duplicates(points)
     _check_count(count, len(points))
@@ -68,13 +68,13 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
         lattice = measure_lattice(distinct(points))
     else:
         _check_extent(points, count, float(np.cbrt(lattice.steps.prod())))
-    if lattice is not None and not Cells.of(lattice_indices(points, lattice)).gappy():
+    if lattice is not None and not OccupiedCells.of(lattice_indices(points, lattice)).gappy():
         return
     X = distinct(points)
     if _one_layer_of_points(X) and not _in_three_directions(X):
         raise InputError(
             f"the {len(X)} points lie on one surface, on no lattice of touching blocks: a sheet "
-            "one block thick, and nothing tells how thick a block is; give at least two layers "
+            "one block thick, whose thickness the points do not show; give at least two layers "
             "of blocks (smaller blocks across the sheet)"
         )
 
@@ -89,9 +89,9 @@ def _check_count(count: int, rows: int) -> None:
 
 
 def _check_extent(X: Floats, count: int, spacing: float) -> None:
-    """Raise when the points' extents across their main directions are (nearly) nothing.
+    """Raise InputError if the points lie in a column, on a line or in a plane.
 
-    So many of them are distinct, and they lie about so far apart.
+    ``count`` is the number of distinct points, ``spacing`` their typical distance.
     """
     limit = _FLAT * spacing
     constant = np.ptp(X, axis=0) < limit
@@ -110,21 +110,21 @@ def _check_extent(X: Floats, count: int, spacing: float) -> None:
         )
     if across < limit:
         raise InputError(
-            f"all {count} points are in one plane, so nothing tells how thick the body is (and "
-            "it is unfolded already); give at least two layers of blocks"
+            f"all {count} points are in one plane, so the body's thickness is not known (and it is "
+            "unfolded already); give at least two layers of blocks"
         )
 
 
 def _one_layer_of_points(X: Floats) -> bool:
-    """Say whether scattered points lie on one surface, within their noise.
+    """Return whether scattered points lie on one surface, within their noise.
 
-    A paraboloid is fitted to each point's 24 nearest neighbours across their direction of
-    least variance; the rms distance from it, over the median distance of the nearest
-    neighbour, is 0 on a surface and 0.5 for two layers.  Neighbourhoods along a line (columns
-    of flat blocks) count as thick.
+    A paraboloid is fitted to each point and its 24 nearest neighbours, as a height along their
+    direction of least variance. The rms distance from it, over the median distance of the nearest
+    neighbour, is 0 on a surface and 0.5 for two layers. Neighbourhoods along a line (columns of
+    flat blocks) count as thick.
     """
-    some = X[:: -(-len(X) // SAMPLE)]
-    distance, near = neighbours(cKDTree(X), some, 25)
+    some = X[:: -(-len(X) // _SAMPLE)]
+    distance, near = nearest_points(cKDTree(X), some, 25)
     local = X[near] - X[near].mean(axis=1, keepdims=True)
     spread, turn = np.linalg.eigh(np.einsum("nki,nkj->nij", local, local))
     w, v, u = np.moveaxis(local @ turn, 2, 0)
@@ -139,14 +139,15 @@ def _one_layer_of_points(X: Floats) -> bool:
 
 
 def _in_three_directions(X: Floats) -> bool:
-    """Say whether most points have neighbours along three directions, as blocks in layers have.
+    """Return whether most points have neighbours in three directions, as blocks in layers have.
 
-    From the nearest other point; the nearest across it; and the nearest more than 60 degrees out
-    of the plane of both, which a sheet of one layer has none of.  Folded grids of flat or
-    long blocks, whose nearest points all lie on a line or two, count as thick by this.
+    The first direction is that of the nearest other point, the second that of the nearest one
+    across the first. The third is more than 60 degrees out of the plane of both; a sheet of one
+    layer has no neighbour there. Folded grids of flat or long blocks, whose nearest points all lie
+    on one line or two, have one and count as thick.
     """
-    some = X[:: -(-len(X) // SAMPLE)]
-    near = neighbours(cKDTree(X), some, _AROUND)[1]
+    some = X[:: -(-len(X) // _SAMPLE)]
+    near = nearest_points(cKDTree(X), some, _AROUND)[1]
     D = X[near[:, 1:]] - some[:, None]
     length = np.linalg.norm(D, axis=2)
     first = D[:, 0] / length[:, :1]

@@ -1,8 +1,8 @@
-"""The block lattice behind a cloud of centroids: its axes and its step along each.
+"""The lattice of a block model, measured from its centroids: axes, and the step along each.
 
 A block model lists the centroids of equal boxes: positions ``origin + (k * steps) @ axes``
-with whole ``k``.  The boxes' sides may differ and the model may be turned about any axis.
-Points that follow no such lattice (folded grids, noisy or scattered points) have none.
+with whole ``k``. The boxes' sides may differ and the model may be turned about any axis.
+Folded grids, noisy points and scattered points have no such lattice.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from geounfold.errors import InputError
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 SHARE = 0.97
-"""Share of the points that must lie on a lattice for it to count as theirs."""
+"""Least share of the points on a lattice that counts as theirs."""
 
 TOLERANCE = 0.03
-"""A point lies on the lattice within this share of a step along each axis.
+"""Distance from a lattice position, in steps along each axis, within which a point lies on it.
 
 Coordinates written with 2 decimals for 2.5 m blocks are off by up to 0.003 steps; noise of
 0.12 steps keeps 1 % of the points inside, chance alone 0.02 %.
 """
 
 _DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10)  # finer steps tried: sub-blocks in a parent block
-_PARTS = (1, 2, 4)  # of the steps first seen, tried in turn
-_SEEDS, _BALL, _CENTRAL = 6, 1000, 30  # places looked at, points at each, points compared
-_LOOSE = 0.15  # in steps: points that take part in a fit before its last
-_FITTED = 200_000  # points that the last fits take in where there are more than twice so many
-_MIXED = np.array([7.0, 11.0, 13.0]) * np.sqrt([2.0, 3.0, 5.0])  # no lattice is regular to it
+_PARTS = (1, 2, 4)  # by which the steps found first are divided, tried in turn
+_SEEDS, _BALL, _CENTRAL = 6, 1000, 30  # groups of points, points in each, points compared
+_LOOSE = 0.15  # in steps: as TOLERANCE, for the points of all fits but the last
+_FITTED = 200_000  # points that the last fits use if there are more than twice as many
+_MIXED = np.array([7.0, 11.0, 13.0]) * np.sqrt([2.0, 3.0, 5.0])  # no regular lattice aligns with it
 _SLICE = 1 << 14  # points at once
-_SAMPLED = 200_000  # points beyond which point_spacing looks at a part of them
+_SAMPLED = 200_000  # points above which point_spacing uses a part of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Lattice:
     share : float
         Share of the points that lie on the lattice, within ``TOLERANCE`` steps.
     origin : (3,) float
-        World coordinates of one lattice position, amid the points.
+        World coordinates of one lattice position, in the middle of the points.
     """
 
     axes: Floats
@@ -75,13 +75,13 @@ def proper_permutations() -> Floats:
 
 
 def measure_lattice(points: Floats) -> Lattice | None:
-    """Return the lattice behind a cloud of centroids, or None where there is none.
+    """Return the lattice of centroids; None if they have none.
 
-    The directions come from the shortest difference vectors that many points share, at six
-    places spread over the cloud; a fit (orthogonal Procrustes on whole indices) grows from
-    one place to all of them and then takes in every point.  Where fewer than 97 % of the
-    points fit, finer steps are tried (sub-blocks: a half, a third, ... of the parent's step),
-    so the lattice returned is the coarsest that 97 % of the points lie on.
+    The directions are the shortest difference vectors that many points share, in six groups of
+    points spread over the model. A fit (orthogonal Procrustes on whole indices) starts from one
+    group, grows to all of them and then uses every point. If fewer than 97 % of the points lie on
+    the lattice, finer steps are tried (sub-blocks: a half, a third, ... of the parent's step). The
+    lattice returned is the coarsest on which 97 % of the points lie.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def measure_lattice(points: Floats) -> Lattice | None:
     Returns
     -------
     Lattice or None
-        Linear in n; the same, to rounding, for every order of the rows.
+        The same, to rounding, for every order of the rows. The time is linear in n.
 
     Examples
     --------
@@ -126,9 +126,9 @@ def lattice_indices(points: Floats, lattice: Lattice, origin: Floats | None = No
     points : (n, 3) float
         World coordinates.
     lattice : Lattice
-        As measured; a point off the lattice gets the nearest cell.
+        The points' lattice; a point off it gets the nearest cell.
     origin : (3,) float, optional
-        Lattice position of the cell (0, 0, 0); the lattice's own when left out.
+        Lattice position of the cell (0, 0, 0); the lattice's own by default.
     """
     start = lattice.origin if origin is None else origin
     cells: Ints = np.rint((points - start) @ lattice.axes.T / lattice.steps).astype(np.int64)
@@ -138,7 +138,7 @@ def lattice_indices(points: Floats, lattice: Lattice, origin: Floats | None = No
 def distinct(points: Floats) -> Floats:
     """Return the distinct points, (m, 3), in lexicographic order.
 
-    Points that already are distinct and in order are returned as they are, without sorting.
+    Points that are distinct and in order already are returned unchanged, without sorting.
     """
     if _in_order(points):
         return points
@@ -159,9 +159,9 @@ def _in_order(points: Floats) -> bool:
 def point_spacing(points: Floats) -> float:
     """Return the typical spacing of points, in their unit.
 
-    The median over the points of the mean distance to the six nearest others; duplicates
-    count once.  Beyond 200,000 points the median is over every m-th in the order of their
-    distance from the mean, which no rigid motion changes.
+    It is the median over the points of the mean distance to the six nearest others; duplicates
+    count once. Above 200,000 points the median is over every m-th one in the order of distance
+    from the mean, an order that no rigid motion changes.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def point_spacing(points: Floats) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Lattice positions are ``origin + (k * steps) @ axes``."""
+    """A lattice under construction: its positions are ``origin + (k * steps) @ axes``."""
 
     axes: Floats
     steps: Floats
@@ -195,10 +195,10 @@ class Fit:
 
 
 def _balls(X: Floats) -> list[Floats]:
-    """Compact groups of points around places far apart, each ordered from its place.
+    """Return compact groups of points around centres far apart, nearest to the centre first.
 
-    The first place is the point nearest to the mean, each next one the farthest from those
-    before; groups close to the first come first.
+    The first centre is the point nearest to the mean, each next one the farthest from those
+    before. Groups close to the first one come first.
     """
     distance = _squared(X, X.mean(axis=0))
     place = _extreme(-distance, X)
@@ -226,14 +226,14 @@ def _squared(X: Floats, place: Floats) -> Floats:
 
 
 def _extreme(value: Floats, X: Floats) -> Floats:
-    """Return the point of greatest value; of equals, the first in lexicographic order."""
+    """Return the point of greatest value; of equal ones, the first in lexicographic order."""
     best = X[value == value.max()]
     out: Floats = best[np.lexsort(best.T[::-1])[0]]
     return out
 
 
 def _nearest(X: Floats, distance: Floats, count: int) -> Floats:
-    """Return the points of the ``count`` least distances (ties all in), nearest first."""
+    """Return the points of the ``count`` least distances and equal ones, nearest first."""
     if len(X) > count:
         kept = distance <= np.partition(distance, count - 1)[count - 1]
         X, distance = X[kept], distance[kept]
@@ -242,7 +242,7 @@ def _nearest(X: Floats, distance: Floats, count: int) -> Floats:
 
 
 def _growing(balls: list[Floats]) -> list[Floats]:
-    """Nested samples, each reaching a little farther than the one before."""
+    """Return nested samples, each reaching a little farther than the one before."""
     inner = [balls[0][:60], balls[0][:250]]
     return inner + [np.concatenate(balls[: i + 1]) for i in range(len(balls))]
 
@@ -267,10 +267,10 @@ def _directions(balls: list[Floats]) -> tuple[Floats, Floats] | None:
 
 
 def _shortest(ball: Floats, across: list[Floats]) -> Floats:
-    """Return each central point's shortest difference to the ball's, across given vectors.
+    """Return each central point's shortest difference to the ball's points, across given vectors.
 
-    Points without one get none; "across" means a component along each given vector of less
-    than 5 % of that vector.
+    "Across" means that the component along each given vector is less than 5 % of that vector.
+    Points without such a difference are left out.
     """
     central = ball[:_CENTRAL]
     D = ball[None] - central[:, None]
@@ -286,7 +286,7 @@ def _shortest(ball: Floats, across: list[Floats]) -> Floats:
 
 
 def _peak(groups: list[Floats]) -> Floats | None:
-    """Return the mean of the densest cluster of vectors, opposite ones taken as one."""
+    """Return the mean of the densest cluster of vectors; opposite vectors count as equal."""
     V = np.concatenate(groups)
     if len(V) < 4:
         return None
@@ -302,7 +302,7 @@ def _peak(groups: list[Floats]) -> Floats | None:
 
 
 def _anchor(ball: Floats, axes: Floats, steps: Floats) -> Floats:
-    """Return the central point that most points of the ball share a rough lattice with."""
+    """Return the central point from which most points of the ball lie on a rough lattice."""
     near = ball[:250]
     best, most = ball[0], -1
     for candidate in ball[:_CENTRAL]:
@@ -314,7 +314,7 @@ def _anchor(ball: Floats, axes: Floats, steps: Floats) -> Floats:
 
 
 def _on_lattice(cells: Floats, tolerance: float) -> Bools:
-    """Return which positions (in steps) are whole along every axis, (n,)."""
+    """Return whether each position (in steps) is whole along every axis, (n,)."""
     out: Bools = np.all(_whole(cells, tolerance), axis=1)
     return out
 
@@ -326,10 +326,10 @@ def _whole(cells: Floats, tolerance: float) -> Bools:
 
 
 def refit(X: Floats, fit: Fit, tolerance: float) -> Fit | None:
-    """Return the least-squares lattice of the points near a rough one; None where few are.
+    """Return the least-squares lattice of the points near a rough one; None if few are near.
 
-    Alternates orthogonal Procrustes for the axes with linear least squares for the steps,
-    on the moments of the whole indices; a direction with one index alone keeps its step.
+    The fit alternates orthogonal Procrustes for the axes with linear least squares for the steps,
+    on the moments of the whole indices. A direction with a single index keeps its step.
     """
     cells = fit.cells(X)
     near = _on_lattice(cells, tolerance)
@@ -351,7 +351,7 @@ def refit(X: Floats, fit: Fit, tolerance: float) -> Fit | None:
 
 
 def _accepted(X: Floats, fit: Fit, reference: Floats) -> Lattice | None:
-    """Return the lattice that 97 % of all points lie on, or None; of many, some are fitted."""
+    """Return the lattice on which 97 % of all points lie, fitted to some of them, or None."""
     some = _some(X)
     loose = refit(some, fit, _LOOSE)
     if loose is None:
@@ -372,9 +372,9 @@ def _accepted(X: Floats, fit: Fit, reference: Floats) -> Lattice | None:
 
 
 def _some(X: Floats) -> Floats:
-    """Return about _FITTED of more than twice so many points, spread over all of them.
+    """Return about _FITTED points if there are more than twice as many, spread over all of them.
 
-    Which ones depends on their coordinates, not on their order.
+    The choice depends on the points' coordinates, not on their order.
     """
     if len(X) <= 2 * _FITTED:
         return X
@@ -407,7 +407,7 @@ def _finest(cells: Floats, steps: Floats) -> Floats | None:
 
 
 def named(axes: Floats, steps: Floats) -> tuple[Floats, Floats]:
-    """Return axes and steps in the naming nearest to the world's axes, free of rounding."""
+    """Return axes and steps in the order nearest to the world's axes, free of rounding."""
     turns = proper_permutations()
     best = turns[np.round(np.einsum("aij,ji->a", turns, axes), 9).argmax()]
     axes, steps = best @ axes, (best * best) @ steps

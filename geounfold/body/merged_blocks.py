@@ -9,10 +9,10 @@ because they alone locate it to a fraction of a block.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
+from geounfold.body.block_cells import OccupiedCells, offsets
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 MERGE_ABOVE = 60_000
@@ -27,7 +27,6 @@ LEAST_LAYERS = 1.0
 _SLANT = 1.5
 """Mean over all directions of |nx| + |ny| + |nz|: faces of blocks per unit of a smooth surface."""
 
-_DENSE = 8  # positions in the cells' box per block, up to which an array of all of them is used
 _FILLED = 0.5  # least share of an inner cell off a lattice, because blocks per cell vary
 _OFF = np.array([0.3711, 0.6173, 0.1437])  # of a cell: no grid point lies on a border of cells
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -92,19 +91,14 @@ def merge_blocks(points: Floats, steps: Floats | None, merge: int) -> MergedBloc
     merge : int
         Blocks along a cell's side, 2 or more.
     """
-    cells = _Cells.of(_places(points, steps, merge))
-    share = cells.count / merge**3
-    middle = [np.bincount(cells.row, x) / cells.count / merge for x in points.T]
+    cells, row = OccupiedCells.numbered(_places(points, steps, merge))
+    count = np.bincount(row)
+    share = count / merge**3
+    middle = [np.bincount(row, x) / count / merge for x in points.T]
     full = share >= (_FILLED if steps is None else 1.0)
-    inner = cells.least(full.astype(np.float64))
-    deep = cells.least(inner)
-    return MergedBlocks(
-        merge,
-        np.stack(middle, axis=1),
-        share,
-        (inner < 1)[cells.row],
-        (deep < 1)[cells.row],
-    )
+    inner = _least(cells, full.astype(np.float64))
+    deep = _least(cells, inner)
+    return MergedBlocks(merge, np.stack(middle, axis=1), share, (inner < 1)[row], (deep < 1)[row])
 
 
 def _largest(points: Floats, steps: Floats | None) -> int:
@@ -112,9 +106,9 @@ def _largest(points: Floats, steps: Floats | None) -> int:
 
     Surface and thickness are measured on cells of two blocks a side.
     """
-    cells = _Cells.of(_places(points, steps, 2))
+    cells, row = OccupiedCells.numbered(_places(points, steps, 2))
     sides = np.ones(3) if steps is None else steps
-    area = 4 * cells.area(cells.count / 8, 1 / sides) / _SLANT
+    area = 4 * _surface_area(cells, np.bincount(row) / 8, 1 / sides) / _SLANT
     thickness = 2 * len(points) / area
     wanted = np.ceil(np.sqrt(area / LEAST_SURFACE))
     return int(max(1, min(wanted, thickness // LEAST_LAYERS)))
@@ -126,51 +120,28 @@ def _places(points: Floats, steps: Floats | None, merge: int) -> Ints:
     return np.floor(at).astype(np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class _Cells:
-    """Cells by sorted keys, the number of blocks in each, and every block's cell."""
+def _at(cells: OccupiedCells, values: Floats, step: tuple[int, ...]) -> Floats:
+    """Return the values (k,) of the cells a step away from each cell; 0 for empty cells."""
+    found = cells.rows(cells.keys + int(np.dot(step, cells.stride)))
+    return np.where(found >= 0, values[found], 0.0)
 
-    key: Ints
-    count: Ints
-    row: Ints
-    stride: Ints
 
-    @classmethod
-    def of(cls, places: Ints) -> _Cells:
-        low = places.min(axis=0) - 2
-        shape = places.max(axis=0) - low + 3
-        stride = np.array([shape[1] * shape[2], shape[2], 1])
-        key = (places - low) @ stride
-        if shape.prod() > _DENSE * len(key):
-            distinct, row, count = np.unique(key, return_inverse=True, return_counts=True)
-            return cls(distinct, count, row, stride)
-        every = np.bincount(key)
-        distinct = np.flatnonzero(every)
-        number = np.zeros(len(every), dtype=np.int64)
-        number[distinct] = np.arange(len(distinct))
-        return cls(distinct, every[distinct], number[key], stride)
+def _least(cells: OccupiedCells, values: Floats) -> Floats:
+    """Return the least value of each cell and the 26 around it, (k,); empty cells have 0."""
+    out = values
+    for step in offsets(1):
+        out = np.minimum(out, _at(cells, values, step))
+    return out
 
-    def at(self, values: Floats, step: tuple[int, ...]) -> Floats:
-        """Return the values (k,) of the cells a step away, 0 where there is none."""
-        wanted = self.key + np.array(step) @ self.stride
-        found = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
-        return np.where(self.key[found] == wanted, values[found], 0.0)
 
-    def least(self, values: Floats) -> Floats:
-        """Return the least value of each cell and the 26 around it, (k,)."""
-        out = values
-        for step in product((-1, 0, 1), repeat=3):
-            out = np.minimum(out, self.at(values, step))
-        return out
+def _surface_area(cells: OccupiedCells, share: Floats, faces: Floats) -> float:
+    """Return the area of the surface of partly filled cells, steps of its stairs included.
 
-    def area(self, share: Floats, faces: Floats) -> float:
-        """Return the area of the surface of partly filled cells, steps of its stairs included.
-
-        The total variation of their shares (k,), ``faces`` (3,) the area of a cell's face across
-        each axis: by the co-area formula, the mean area over all levels of the share.
-        """
-        total = 0.0
-        for step, face in zip(_AXES, faces.tolist(), strict=True):
-            last = self.at(np.ones(len(share)), tuple(-s for s in step)) == 0
-            total += face * float(np.abs(share - self.at(share, step)).sum() + share[last].sum())
-        return total
+    It is the total variation of their shares (k,): by the co-area formula, the mean area over all
+    levels of the share. ``faces`` (3,) is the area of a cell's face across each axis.
+    """
+    total = 0.0
+    for step, face in zip(_AXES, faces.tolist(), strict=True):
+        last = _at(cells, np.ones(len(share)), tuple(-s for s in step)) == 0
+        total += face * float(np.abs(share - _at(cells, share, step)).sum() + share[last].sum())
+    return total

@@ -1,4 +1,4 @@
-"""Where a block model lies: its origin, and bearing, plunge and dip of its own axes."""
+"""A block model's own frame: its origin, and the bearing, plunge and dip of its axes."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Floats
 from geounfold.geometry.rotations import rotate, rotation_from_angles
 
-_ORTHONORMAL = 1e-9  # rounding of axes that were computed, not typed
+_ORTHONORMAL = 1e-9  # largest error of axes that were computed, not typed
 
 
 def axes_from_angles(bearing: float, plunge: float = 0.0, dip: float = 0.0) -> Floats:
     """Return a block model's own axes as rows, (3, 3), a right-handed rotation.
 
-    The same angles turn simulated bodies' lattices, variograms and search ellipsoids.
+    Simulated bodies' lattices, variograms and search ellipsoids are turned by the same angles.
 
     Parameters
     ----------
     bearing : float
-        Compass direction of the model's y axis, degrees clockwise from north (world y): 0 is a
+        Compass direction of the model's y axis, degrees clockwise from north (world y); 0 for a
         model that is not turned.
     plunge : float
         Inclination of the y axis, degrees below the horizontal.
     dip : float
-        Degrees by which the x axis then turns downwards about the y axis.
+        Degrees by which the x axis then turns down around the y axis.
 
     Raises
     ------
     OptionError
-        Angles that are not finite, or a plunge beyond 90 degrees.
+        An angle is not finite, or the plunge is beyond 90 degrees.
 
     Examples
     --------
@@ -50,19 +50,19 @@ def axes_from_angles(bearing: float, plunge: float = 0.0, dip: float = 0.0) -> F
 
 @dataclass(frozen=True, eq=False)
 class ModelFrame:
-    """A block model's own coordinates: where their origin lies in the world, and how they turn.
+    """A block model's own coordinates: their origin in the world and their axes.
 
     Attributes
     ----------
     origin : (3,) float
         World coordinates of the model's own (0, 0, 0).
     axes : (3, 3) float
-        The model's own axes as rows, a rotation of the world's; see `axes_from_angles`.
+        The model's own axes as rows, a rotation of the world's (see `axes_from_angles`).
 
     Raises
     ------
     OptionError
-        An origin that is not three finite numbers, or axes that are no right-handed rotation.
+        The origin is not three finite numbers, or the axes are not a right-handed rotation.
 
     Examples
     --------

@@ -1,10 +1,10 @@
-"""The lattice behind centroids that noise has moved off it.
+"""The lattice of centroids that noise has moved off it.
 
-Noise of a fifth of a block leaves no point on its lattice, but the mean of ``exp(2 pi i q.x)`` over
-the points still peaks at the lattice's wave vectors q, by exp(-2 pi^2 0.2^2) = 0.45 of what
-it would be, where chance alone gives one over the root of their number.  Two peaks are found by a
-Fourier transform of the points around one place, the third along the direction across both; a
-fit to the nearest lattice positions then grows from there to all points.
+Noise of a fifth of a block leaves no point on its lattice. But the mean of ``exp(2 pi i q.x)`` over
+the points still peaks at the lattice's wave vectors q, at exp(-2 pi^2 0.2^2) = 0.45 of its value
+without noise; points at random give one over the root of their number. A Fourier transform of the
+points around one centre finds two peaks; the third lies in the direction across both. A fit to the
+nearest lattice positions then grows from there to all points.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from geounfold.body.lattice import Fit, Lattice, distinct, named, refit
 from geounfold.geometry.mesh import Floats
 
 CLEAR = 0.3
-"""Least coherence of all points along each axis: noise of 0.25 steps."""
+"""Least coherence of all points along each axis; noise of 0.25 steps gives it."""
 
-_PEAK = 0.12  # least coherence of the first points; 4,000 at random reach 0.07
-_BALL = 4000  # points around the place where the search starts
+_PEAK = 0.12  # least coherence of the first points; 4,000 points at random reach 0.07
+_BALL = 4000  # points around the centre from which the search starts
 _NODES = 128  # per axis of the transform's grid
-_HALVINGS = 12  # of the step towards a peak: to 1/4000 of its width
-_TRIED = 2000  # nodes of the transform whose coherence is taken without the grid, at most
-_LONGEST = 0.45  # longest step, of the ball's radius
+_HALVINGS = 12  # of the step towards a peak, to 1/4000 of its width
+_TRIED = 2000  # nodes of the transform, at most, whose coherence is computed from the points
+_LONGEST = 0.45  # longest step, as a share of the ball's radius
 _SQUARE = 0.12  # largest cosine between wave vectors
-_HARMONIC = 0.6  # a shorter wave vector along the same line counts from this share of the peak
-_ROUNDS = 20  # of the last fit, until no point changes its position
+_HARMONIC = 0.6  # least share of the peak at which a shorter wave vector on its line counts
+_ROUNDS = 20  # of the last fit, at most, until no point changes its position
 _GROWTH = 2.0  # of the number of points from fit to fit
 
 
 def disturbed_lattice(points: Floats) -> Lattice | None:
-    """Return the lattice that noisy centroids scatter about, or None where there is none.
+    """Return the lattice around which noisy centroids scatter; None if they have none.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def disturbed_lattice(points: Floats) -> Lattice | None:
     Returns
     -------
     Lattice or None
-        ``share`` is the least coherence along an axis: 1 without noise, 0.45 with a standard
-        deviation of 0.2 steps.
+        Its ``share`` is the least coherence along an axis: 1 without noise, 0.45 with noise of a
+        standard deviation of 0.2 steps.
     """
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     X = distinct(points) - middle
@@ -85,7 +85,7 @@ def _phases(X: Floats, fit: Fit) -> NDArray[np.complex128]:
 
 
 def _shifted(X: Floats, fit: Fit) -> Fit:
-    """Return the fit with its origin where the points' mean phase is zero."""
+    """Return the fit with its origin moved so that the points' mean phase is zero."""
     phase = np.angle(_phases(X, fit).mean(axis=0)) / (2 * np.pi)
     return Fit(fit.axes, fit.steps, fit.origin + (phase * fit.steps) @ fit.axes)
 
@@ -98,7 +98,7 @@ def _square(axes: Floats) -> Floats:
 
 
 def _waves(ball: Floats) -> Floats | None:
-    """Return three wave vectors (3, 3), square to each other, that a ball's points share."""
+    """Return three wave vectors at right angles, (3, 3), that a ball's points share, or None."""
     radius = float(np.linalg.norm(ball[-1]))
     taper = np.exp(-2 * (ball * ball).sum(axis=1) / radius**2)
     taper = taper / taper.sum()
@@ -113,7 +113,8 @@ def _waves(ball: Floats) -> Floats | None:
     candidates = np.argwhere((power > _PEAK) & (size > least))
     strongest = np.argsort(-power[tuple(candidates.T)], kind="stable")[:_TRIED]
     Q = np.stack([q[axis][candidates[strongest, axis]] for axis in range(3)], axis=1)
-    value = _coherence(ball, taper, Q)  # not of the grid: waves too short for it pass for long ones
+    # Of the points themselves: on the grid, waves too short for it look like long ones.
+    value = _coherence(ball, taper, Q)
     Q, value = Q[value > _PEAK], value[value > _PEAK]
     first = _shortest_peak(Q, value)
     if first is None:
@@ -135,7 +136,7 @@ def _waves(ball: Floats) -> Floats | None:
 
 
 def _climbed(ball: Floats, taper: Floats, wave: Floats, step: float) -> Floats:
-    """Return the wave vector of greatest coherence near one, by steps halved to nothing."""
+    """Return the wave vector of greatest coherence near one, by steps that are halved."""
     around = np.stack(np.meshgrid(*[(0.0, -1.0, 1.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     for _ in range(_HALVINGS):
         tried = wave + step * around

@@ -1,4 +1,4 @@
-"""A body made ready for the methods: its lattice, its working frame, its parts."""
+"""The points prepared for the methods: lattice, working frame, separate bodies."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from geounfold.body.lattice import Lattice, distinct, measure_lattice
 from geounfold.body.noisy_lattice import disturbed_lattice
 from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
-from geounfold.body.sub_blocks import solid_cells
+from geounfold.body.sub_blocks import filled_cells
 from geounfold.body.working_frame import Frame, working_frame
 from geounfold.geometry.mesh import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
-    """The points of a run, and what was measured of them.
+    """The points of a run, with their lattice, working frame and bodies.
 
     Attributes
     ----------
     points : (n, 3) float
-        As given, in the data's coordinates.
+        In the data's coordinates, as given.
     work : (n, 3) float
-        The same in working units: one block has volume 1.
+        In working units, in which one block has volume 1.
     frame : Frame
-        Between the data's coordinates and working units.
+        The working frame, which converts between both.
     lattice : Lattice or None
         The lattice of the blocks; None for scattered points and noisy grids.
     groups : tuple of (k,) int
@@ -53,9 +53,9 @@ class BodyPoints:
     Attributes
     ----------
     fitted : (m, 3) float
-        What the body is fitted to: blocks on their lattice, sub-blocks and gaps filled.
+        The blocks that are fitted: moved onto their lattice, sub-blocks and gaps filled.
     blocks : (b, 3) float
-        The blocks as given, which the map has to hold.
+        The blocks as given, which the map must contain.
     """
 
     fitted: Floats
@@ -65,29 +65,29 @@ class BodyPoints:
 def prepare(
     points: Floats, body: int | str | None = None
 ) -> tuple[PreparedPoints, list[BodyPoints]]:
-    """Return the points made ready, and each body's own.
+    """Return the prepared points of the run, and those of each body.
 
     Parameters
     ----------
     points : (n, 3) float
         Finite centroids in the data's coordinates, any order and orientation.
     body : int, "all" or None
-        Which of several separate bodies (see `select_body`).
+        The choice among separate bodies, as `select_body` takes it.
 
     Raises
     ------
     InputError
-        The points are no body, or several and none is chosen.
+        The points are no body, or several bodies of which none is chosen.
     OptionError
         There is no body of that number.
     """
     lattice = measure_lattice(points)
-    solid = solid_cells(points, lattice)
-    filled, lattice = (points, lattice) if solid is None else (solid.points, solid.lattice)
+    cells = filled_cells(points, lattice)
+    filled, lattice = (points, lattice) if cells is None else (cells.points, cells.lattice)
     frame = _frame(points, filled, lattice)
     work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))
     labels = separate_bodies(work, frame)
-    own = labels if solid is None else labels[solid.home]
+    own = labels if cells is None else labels[cells.home]
     groups = select_body(points, own, body)
     given = frame.to_work(points)
     bodies = [

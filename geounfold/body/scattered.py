@@ -1,15 +1,16 @@
-"""Points that follow no grid: whether they do, and how far apart they lie from place to place."""
+"""Scattered points: whether points follow a grid, and their spacing from place to place."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from geounfold.backends.threads import cores
 from geounfold.body.lattice import distinct
 from geounfold.geometry.mesh import Floats, Ints
 
 UNEVEN = 0.22
-"""Unevenness from which points count as scattered.
+"""Unevenness above which points count as scattered.
 
 Measured: 0.27 for points thrown at random, whatever their density; 0 on folded grids, 0.15 on
 grids with noise of 0.2 blocks, 0.19 where their blocks have sides of 4 to 1.
@@ -20,17 +21,17 @@ QUIET = 0.02
 
 _NEAR = 12  # neighbours compared, and those whose distance gives the spacing
 _WIDE = 40  # neighbours among which the density inside the body is looked for
-_INNER = 85  # its percentile there: points near the surface see half a ball
-_JUDGED, _ANCHORS = 500, 3000  # points that unevenness, and spacing, are measured at
-_SHARED = 8  # nearest of the latter that a point's spacing is averaged over
+_INNER = 85  # percentile of the density: balls around points near the surface are half empty
+_JUDGED, _ANCHORS = 500, 3000  # points at which unevenness, and spacing, are measured
+_SHARED = 8  # nearest anchors over which a point's spacing is averaged
 _BALL = (3 / (4 * np.pi)) ** (1 / 3)
 
 
 def unevenness(points: Floats) -> float:
     """Return how much the distance to the nearest other point differs between neighbours.
 
-    The median over (some of) the points of the absolute difference between the logarithm of
-    their distance and its mean over their twelve neighbours; whatever slowly varies drops out.
+    It is the median over some of the points of the absolute difference between the logarithm of a
+    point's distance and its mean over the point's twelve neighbours. Slow variations cancel.
     """
     X = distinct(points)
     if len(X) < 2 * _NEAR:
@@ -43,9 +44,9 @@ def unevenness(points: Floats) -> float:
 
 
 def local_spacing(points: Floats) -> Floats:
-    """Return the typical spacing of the points around each, (n,), in their unit.
+    """Return the typical spacing of the points around each point, (n,), in their unit.
 
-    The side of the cube that holds one point at the density inside the body there.
+    It is the side of the cube that holds one point, at the density inside the body there.
     """
     X = distinct(points)
     tree = cKDTree(X, balanced_tree=False, compact_nodes=False)
@@ -68,12 +69,21 @@ def scattered(points: Floats) -> bool:
 
 
 def scattered_spacing(points: Floats) -> float:
-    """Return the side of the cube that one of scattered points fills in the mean, in their unit."""
+    """Return the side of the cube that a scattered point fills in the mean, in the points' unit."""
     return float(np.cbrt(np.mean(local_spacing(points) ** 3)))
 
 
+def nearest_points(tree: cKDTree, points: Floats, count: int) -> tuple[Floats, Ints]:
+    """Return distances and rows of the ``count`` nearest points of a tree, (m, count) each.
+
+    A point of the tree is its own nearest one.
+    """
+    distance, near = tree.query(points, k=min(count, tree.n), workers=cores())
+    return np.asarray(distance), np.asarray(near, dtype=np.int64)
+
+
 def _some(points: Floats, count: int) -> Ints:
-    """Return about ``count`` points: every m-th in the order of their distance from the mean."""
+    """Return about ``count`` rows: every m-th in the order of distance from the mean."""
     X = points - points.mean(axis=0)
     rank = np.argsort(np.einsum("ij,ij->i", X, X), kind="stable")
     out: Ints = rank[:: -(-len(points) // count)]

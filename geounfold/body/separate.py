@@ -1,4 +1,4 @@
-"""What the points must be to have a top and a bottom, and the separate bodies among them."""
+"""The separate bodies among the points, and the choice of those to unfold."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from geounfold.body.block_cells import Cells, neighbours, offsets
+from geounfold.body.block_cells import OccupiedCells, connected, offsets
+from geounfold.body.scattered import nearest_points
 from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError, OptionError
 from geounfold.geometry.mesh import Floats, Ints
@@ -18,11 +17,9 @@ from geounfold.geometry.mesh import Floats, Ints
 SPECK_SHARE = 0.005
 """A body with a smaller share of the points is a speck."""
 
-
-_NEAR, _WIDE = 21, 64  # neighbours that join scattered points, and those tried for the rest
-
-
-_REACH, _CAP = 1.15, 2.0  # of the near neighbours' distance; of its median
+_NEAR, _WIDE = 21, 64  # nearest points that join scattered points, and those tried for the rest
+_REACH = 1.15  # times the distance of the 20th neighbour: how far the rest is joined
+_CAP = 2.0  # times the median distance of the 20th neighbour: farthest join of scattered points
 
 
 @dataclass(frozen=True)
@@ -32,13 +29,13 @@ class ConnectedPart:
     Attributes
     ----------
     label : int
-        Its number: 0 is the largest.
+        Its number; 0 is the largest.
     size : int
         Number of its blocks, duplicates included.
     centre : tuple of float
-        Mean of its points, in the coordinates given.
+        Mean of its points, in their coordinates.
     speck : bool
-        True when it holds less than 0.5 % of all points.
+        Whether it holds less than 0.5 % of all points.
     """
 
     label: int
@@ -48,27 +45,27 @@ class ConnectedPart:
 
 
 def separate_bodies(points_work: Floats, frame: Frame) -> Ints:
-    """Return the body that each point belongs to, (n,): 0 the largest, then by size.
+    """Return the body that each point belongs to, (n,), numbered from 0 by decreasing size.
 
-    On a lattice, blocks are connected when they touch (faces, edges or corners) or one
-    missing block lies between them.  Scattered points, and lattices most of whose positions
-    are empty (sub-blocked models), are connected to their 20 nearest neighbours and to points
-    15 % farther, but over no more than twice the median distance of the 20th neighbour: that
-    bridges one missing point of a regular grid and not three.  Bodies of equal size are
-    numbered by their lowest point in lexicographic order.
+    On a lattice, blocks are connected if they touch (at faces, edges or corners) or if one missing
+    block lies between them. Scattered points are connected to their 20 nearest neighbours and to
+    points up to 15 % farther, at most twice the median distance of the 20th neighbour. That
+    bridges one missing point of a regular grid and not three. Lattices on which a fifth of the
+    points or more have no neighbour (sub-blocked models) are connected like scattered points.
+    Bodies of equal size are numbered by their lowest point in lexicographic order.
 
     Parameters
     ----------
     points_work : (n, 3) float
         Points in working units.
     frame : Frame
-        Their frame.
+        The points' working frame.
     """
     labels: Ints | None = None
     if frame.steps is not None:
-        cells = Cells.of(np.rint(points_work / frame.steps).astype(np.int64))
+        cells, row = OccupiedCells.numbered(np.rint(points_work / frame.steps).astype(np.int64))
         if not cells.gappy():
-            labels = _connected_cells(cells)[cells.cell]
+            labels = _connected_cells(cells)[row]
     if labels is None:
         sides = 1.0 if frame.sides is None else frame.sides
         labels = _connected_points(points_work / sides)
@@ -81,9 +78,9 @@ def describe_bodies(points: Floats, labels: Ints) -> tuple[ConnectedPart, ...]:
     Parameters
     ----------
     points : (n, 3) float
-        In the coordinates that the centres shall have (world).
+        In the coordinates in which the centres are wanted, such as the world's.
     labels : (n,) int
-        As separate_bodies gives them.
+        The body of each point, from separate_bodies.
     """
     sizes = np.bincount(labels)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -105,18 +102,17 @@ def select_body(points: Floats, labels: Ints, choice: int | str | None = None) -
     points : (n, 3) float
         World coordinates.
     labels : (n,) int
-        As separate_bodies gives them.
+        The body of each point, from separate_bodies.
     choice : int, str or None
-        A body's number, ``"all"`` (every body that is no speck, one after the other), or None:
-        the only body.  Specks beside one body do not make a choice necessary; report them
-        (describe_bodies).
+        A body's number; ``"all"`` for every body that is not a speck; or None for the only body.
+        Specks beside one body make no choice necessary; describe_bodies lists them.
 
     Raises
     ------
     InputError
-        Several bodies and no choice; each is named with its size and centre.
+        Several bodies and no choice; the message names each with its size and centre.
     OptionError
-        The choice is no body's number and not ``all``.
+        The choice is neither a body's number nor ``all``.
     """
     bodies = describe_bodies(points, labels)
     whole = [body.label for body in bodies if not body.speck] or [0]
@@ -138,13 +134,13 @@ def _body_number(choice: int | str, bodies: Sequence[ConnectedPart]) -> int:
     text = str(choice).strip()
     if not text.isdecimal() or int(text) >= len(bodies):
         raise OptionError(
-            f"--body {choice} is none of all, 0 to {len(bodies) - 1}: {_listed(bodies)}"
+            f"--body must be all or 0 to {len(bodies) - 1}, but is {choice}: {_listed(bodies)}"
         )
     return int(text)
 
 
 def _listed(bodies: Sequence[ConnectedPart], most: int = 10) -> str:
-    """Name bodies with their sizes and centres, the first ten at most."""
+    """Return bodies with their sizes and centres as text, the first ten at most."""
     named = [
         f"{body.label} ({body.size} blocks around {', '.join(f'{c:.10g}' for c in body.centre)}"
         f"{', a speck' if body.speck else ''})"
@@ -156,50 +152,36 @@ def _listed(bodies: Sequence[ConnectedPart], most: int = 10) -> str:
     return ", ".join(named)
 
 
-def _connected(first: Ints, second: Ints, count: int) -> Ints:
-    """Return component labels (count,) of an undirected graph given by its edges."""
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
-    labels: Ints = connected_components(graph, directed=False)[1].astype(np.int64)
-    return labels
+def _connected_cells(cells: OccupiedCells) -> Ints:
+    """Return the components of cells at most two steps apart along every axis.
 
-
-def _connected_cells(cells: Cells) -> Ints:
-    """Return component labels of cells at most two steps apart along every axis.
-
-    Face neighbours first; the other 118 offsets only from cells outside the largest of those
-    components (an edge between two components has such an end), and not from inner ones.
+    Cells that share a face are joined first. The other offsets are tried only from cells with a
+    free face outside the largest of those parts, because every join of two parts has such a cell.
     """
-    every = np.arange(len(cells.keys))
-    labels = cells.labelled()
-    if labels is not None and labels.max() == 0:
-        return labels
-    found = [cells.find(every, offset) for offset in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-    first = np.concatenate([every[other >= 0] for other in found])
-    second = np.concatenate([other[other >= 0] for other in found])
-    labels = _connected(first, second, len(every))
-    faces = np.bincount(np.concatenate([first, second]), minlength=len(every))
+    labels = cells.parts()
     sizes = np.bincount(labels)
     if len(sizes) == 1:
         return labels
-    open_cells = every[(labels != sizes.argmax()) & (faces < 6)]
+    outside = np.flatnonzero(labels != sizes.argmax())
+    free = outside[cells.face_counts(cells.keys[outside]) < 6]
     joined = [np.zeros((0, 2), np.int64)]
     for offset in offsets(2):
-        other = cells.find(open_cells, offset)
-        pairs = np.stack([labels[open_cells], labels[other]], axis=1)[other >= 0]
+        other = cells.beside(free, offset)
+        pairs = np.stack([labels[free], labels[other]], axis=1)[other >= 0]
         joined.append(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
     a, b = np.concatenate(joined).T
-    return _connected(a, b, len(sizes))[labels]
+    return connected(a, b, len(sizes))[labels]
 
 
 def _connected_points(points: Floats) -> Ints:
-    """Return component labels of scattered points (see separate_bodies).
+    """Return the components of scattered points (see separate_bodies).
 
-    The nearest few neighbours make the first components; farther ones only join those.
+    The few nearest points make the first components; farther ones only join those.
     """
     order = np.asarray(cKDTree(points).indices, dtype=np.int64)
-    X = points[order]  # neighbours in space are neighbours in memory: three times as fast
+    X = points[order]  # neighbours in space become neighbours in memory: three times as fast
     tree = cKDTree(X)
-    distance, near = neighbours(tree, X, _NEAR)
+    distance, near = nearest_points(tree, X, _NEAR)
     reach = np.minimum(distance[:, -1], _CAP * np.median(distance[:, -1]))
     labels = np.arange(len(X))
     for part in (slice(1, 5), slice(5, None)):
@@ -207,7 +189,7 @@ def _connected_points(points: Floats) -> Ints:
     sizes = np.bincount(labels)
     rest = np.flatnonzero(labels != sizes.argmax())
     if len(rest):
-        distance, near = neighbours(tree, X[rest], _WIDE)
+        distance, near = nearest_points(tree, X[rest], _WIDE)
         wide = _REACH * reach
         labels = _joined(labels, labels[rest], near, distance, wide[rest], wide)
     out = np.empty_like(labels)
@@ -218,21 +200,21 @@ def _connected_points(points: Floats) -> Ints:
 def _joined(
     labels: Ints, own: Ints, near: Ints, distance: Floats, own_reach: Floats, reach: Floats
 ) -> Ints:
-    """Return labels with the components joined that neighbours within reach connect.
+    """Return labels with those components joined that neighbouring points connect.
 
-    Rows of ``near`` and ``distance`` belong to points labelled ``own`` that reach
-    ``own_reach``; two points connect when either reaches the other.
+    Row k of ``near`` and ``distance`` is that of a point with label ``own[k]`` and reach
+    ``own_reach[k]``. Two points connect if either reaches the other.
     """
     other = labels[near]
     row, column = np.nonzero(other != own[:, None])
     target = near[row, column]
     close = distance[row, column] <= np.maximum(own_reach[row], reach[target])
     row, target = row[close], target[close]
-    return _connected(own[row], labels[target], int(labels.max()) + 1)[labels]
+    return connected(own[row], labels[target], int(labels.max()) + 1)[labels]
 
 
 def _by_size(labels: Ints, points: Floats) -> Ints:
-    """Renumber labels by decreasing size; equal sizes by their first point in x, y, z."""
+    """Return labels renumbered by decreasing size; equal sizes by their first point in x, y, z."""
     sizes = np.bincount(labels)
     rank = np.zeros(len(sizes), np.int64)
     if len(np.unique(sizes)) < len(sizes):

@@ -1,12 +1,12 @@
-"""The working frame: an invertible similarity between the data's coordinates and the solver's.
+"""The working frame: an invertible similarity between the data's coordinates and working units.
 
-The thesis (section 3.2.1) scales the cloud by one factor, into [0, 1], and turns it so that
-its third principal direction z_p points along z: an axis-angle rotation by
-``theta = arccos(z_p . z)`` about ``n_z = z_p x z``.  Here the factor makes a block (or the
-typical spacing) one unit, so that tolerances are in blocks whatever the body's size, and the
-rotation is the thesis's followed by a turn about z that brings the first principal direction
-(or lattice axis) onto x.  The rotation axis is normalised.  The thesis's own code leaves
-``n_z`` at its length sin(theta), and so turns by theta sin(theta) instead of theta.
+The thesis (section 3.2.1) scales the points by one factor, into [0, 1], and turns them so that
+their third principal direction z_p points along z: an axis-angle rotation by
+``theta = arccos(z_p . z)`` about ``n_z = z_p x z``. Here the factor makes a block (or the typical
+spacing) one unit, so that tolerances are in blocks for bodies of every size. The rotation is the
+thesis's, followed by a turn about z that brings the first principal direction (or lattice axis)
+onto x. The rotation axis is normalised; the thesis's own code leaves ``n_z`` at its length
+sin(theta), and so turns by theta sin(theta) instead of theta.
 """
 
 from __future__ import annotations
@@ -28,29 +28,19 @@ from geounfold.geometry.mesh import Floats, Ints
 from geounfold.geometry.rotations import rotate
 
 DECISIVE = 1e-11
-"""Moments (of unit variance along each axis) closer than this count as equal.
+"""Difference of moments (of unit variance along each axis) below which they count as equal.
 
-Rounding moves them by 1e-14 to 1e-12, at UTM offsets of 1e7 m too; a symmetric body whose
-coordinates are written to four decimals, as tables are, is asymmetric by 1e-10 to 1e-8.
+Rounding moves them by 1e-14 to 1e-12, at UTM offsets of 1e7 m too. A symmetric body whose
+coordinates are written to four decimals, as in tables, is asymmetric by 1e-10 to 1e-8.
 """
 
-
 _LEANING = np.array([[1.0, 0.141, 0.058], [0.173, 0.9, 0.031], [0.062, 0.027, 0.8]])
-"""World axes that a symmetric body's axes are held against, leaning so that nothing ties."""
-
+"""World axes with which a symmetric body's axes are compared; they lean, so that nothing ties."""
 
 _ORDER = 5  # highest order of the moments that choose between axes and signs
-
-
 _CHUNK = 4096  # points per pass over the moments
-
-
-_CLEAR = 0.01  # a moment this large fixes the in-plane direction
-
-
+_CLEAR = 0.01  # least moment that fixes the in-plane direction
 _IN_PLANE = ((2, 0, 0), (1, 2, 0), (1, 0, 2), (2, 0, 1), (1, 0, 1), (3, 0, 0), (4, 0, 0))  # m, a, b
-
-
 _SIGNS = np.array([np.diag(s) for s in ((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1))])
 
 
@@ -58,10 +48,10 @@ _SIGNS = np.array([np.diag(s) for s in ((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1
 class Frame:
     """A similarity: ``work = (world - origin) @ rotation.T / scale``.
 
-    In the working frame one unit is one block (the geometric mean of the block's sides, or
-    the typical point spacing), the points' mean is near the origin and the axes are the
-    lattice's, or the principal axes where there is no lattice; the third axis is the one
-    across the body.  Which side of it is up is not decided here.
+    In the working frame one unit is one block: the geometric mean of the block's sides, or the
+    typical spacing of points without a lattice. The points' mean is near the origin. The axes are
+    the lattice's, or the principal axes without a lattice; the third one points across the body.
+    The frame does not decide which of its two directions is up.
 
     Attributes
     ----------
@@ -72,10 +62,10 @@ class Frame:
     scale : float
         Length of one working unit in the input's unit.
     steps : (3,) float or None
-        Block sides along the frame's axes in working units (product 1) where blocks lie at whole
-        multiples of them; None without a lattice, and where noise has moved them off it.
+        Block sides along the frame's axes in working units (product 1), if blocks lie at whole
+        multiples of them; None without a lattice, or if noise has moved the blocks off it.
     sides : (3,) float or None
-        Block sides, on a lattice or about one; None where they are not known.
+        Block sides, known on a lattice and around one; None if unknown.
     """
 
     origin: Floats
@@ -91,7 +81,7 @@ class Frame:
     def work_columns(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Return x, y and z in the working frame, (n,) each, of world points (n, 3).
 
-        A point's numbers are the same, bit for bit, whatever points come with it.
+        A point's coordinates do not depend, bit for bit, on the other points of the call.
         """
         return rotate(points - self.origin, self.rotation / self.scale)
 
@@ -102,9 +92,9 @@ class Frame:
     def snap(self, points_work: Floats) -> Floats:
         """Return working points (n, 3) moved onto the lattice, exactly ``k * steps``.
 
-        Lattice points that differ by rounding (another offset, orientation or unit) become
-        the same numbers, so that decisions made from them are the same.  Points farther than
-        ``TOLERANCE`` steps from a lattice position stay, as do all without a lattice.
+        Lattice points that differ by rounding (another offset, orientation or unit) become the
+        same numbers, so that they lead to the same decisions. Points farther than ``TOLERANCE``
+        steps from a lattice position are not moved, and without a lattice none is.
         """
         if self.steps is None:
             return points_work
@@ -118,7 +108,7 @@ class Frame:
     def cells(self, points_work: Floats) -> Ints | None:
         """Return the lattice cell of every working point, (n, 3).
 
-        None without a lattice, and where a point lies off it (see ``snap``).
+        None without a lattice, or if a point lies off it (see ``snap``).
         """
         if self.steps is None:
             return None
@@ -147,41 +137,41 @@ class Frame:
 
 
 def working_frame(points: Floats, lattice: Lattice | None, *, exact: bool = True) -> Frame:
-    """Return the canonical working frame of a cloud (see Frame).
+    """Return the canonical working frame of points (see Frame).
 
-    Canonical: a rigid motion, another unit or another order of the rows gives the same set of
-    working coordinates, but for rounding.  With a lattice the axes are the lattice's, in
-    decreasing order of the points' variance; else the principal axes.  Signs, and the order
-    of axes of equal variance, make the body's own moments greatest, taken one after the other
-    until one is decisive: cubic ones first (<x^3>, then <y^3>, <z^3>, each of unit variance:
-    the long tail of the body lies on the positive side), the mixed third moments, then those
-    of order two, four and five.  Bodies for which all of them tie are symmetric, so that each
-    choice gives the same set: the one nearest to the world's axes is taken.  Where the two
-    longest principal axes of scattered points have variances within 1 %, higher moments fix
-    their direction.
+    Canonical means that a rigid motion, another unit or another order of the rows gives the same
+    set of working coordinates, except for rounding. With a lattice the axes are the lattice's, in
+    decreasing order of the points' variance; otherwise they are the principal axes. Signs, and the
+    order of axes of equal variance, make the body's moments greatest. The moments are taken one
+    after the other until one decides: the cubic ones first (<x^3>, then <y^3>, <z^3>, each of unit
+    variance, so that the body's long tail lies on the positive side), the mixed third moments, and
+    those of order two, four and five. A body for which all of them tie is symmetric, so every
+    choice gives the same set; the one nearest to the world's axes is taken. If the two longest
+    principal axes of scattered points have variances within 1 %, higher moments fix their
+    direction.
 
     Parameters
     ----------
     points : (n, 3) float
         World coordinates, not all in one plane.
     lattice : Lattice or None
-        As measure_lattice gives it.
+        The points' lattice.
     exact : bool
-        Whether the points lie on the lattice; else they scatter about it.
+        True if the points lie on the lattice; False if they scatter around it.
 
     Raises
     ------
     InputError
-        Without a lattice: fewer than two distinct points.
+        There is no lattice, and there are fewer than two distinct points.
     """
     if lattice is not None:
         frame = _lattice_frame(points, lattice)
         return frame if exact else replace(frame, steps=None)
-    return _cloud_frame(points)
+    return _scattered_frame(points)
 
 
 def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
-    """Decide everything on whole cells, which rounding does not touch."""
+    """Return the frame of a lattice, decided on whole cells, which rounding does not change."""
     cells = lattice_indices(points, lattice)
     scale = float(np.cbrt(lattice.steps.prod()))
     X = (cells - cells.mean(axis=0)) * (lattice.steps / scale)
@@ -202,8 +192,8 @@ def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
     )
 
 
-def _cloud_frame(points: Floats) -> Frame:
-    """Principal axes, origin at the mean, unit at the typical spacing."""
+def _scattered_frame(points: Floats) -> Frame:
+    """Return the frame of principal axes, with its origin at the mean and the spacing as unit."""
     scale = scattered_spacing(points) if scattered(points) else point_spacing(points)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     origin = middle + (points - middle).mean(axis=0)
@@ -222,7 +212,7 @@ def _cloud_frame(points: Floats) -> Frame:
 
 
 def _by_variance(X: Floats, turns: Floats) -> Floats:
-    """Return the turns that leave the variances in decreasing order; ties all stay."""
+    """Return the turns that leave the variances in decreasing order, all of equal order."""
     variance = np.einsum("ij,ij->j", X, X)
     rotate = (turns * turns) @ (variance / variance.sum())
     for axis in range(2):
@@ -234,9 +224,9 @@ def _by_variance(X: Floats, turns: Floats) -> Floats:
 def _in_plane_turns(X: Floats) -> Floats:
     """Return candidate turns about z, (c, 3, 3), each along the body's in-plane direction.
 
-    The direction is the phase of the first clear moment ``<z^m |z|^a w^b>``, z = x + iy, w
-    the third coordinate; m equal directions follow from it.  The second moment (m = 2) comes
-    first and gives the principal axes; others serve where the two variances are equal.
+    The direction is the phase of the first clear moment ``<z^m |z|^a w^b>``, with z = x + iy and w
+    the third coordinate; m equal directions follow from it. The second moment (m = 2) comes first
+    and gives the principal axes; the others decide if the two variances are equal.
     """
     z = (X[:, 0] + 1j * X[:, 1]) / np.sqrt(np.einsum("ij,ij->", X[:, :2], X[:, :2]) / len(X))
     w = X[:, 2] / max(float(X[:, 2].std()), np.finfo(float).tiny)
@@ -247,7 +237,7 @@ def _in_plane_turns(X: Floats) -> Floats:
         int(np.abs(moments).argmax()),
     )
     m = _IN_PLANE[clear][0]
-    apart = m // 2 if m % 2 == 0 else m  # the opposite direction is the signs' to choose
+    apart = m // 2 if m % 2 == 0 else m  # the choice of signs covers the opposite direction
     angle = (np.angle(moments[clear]) + 2 * np.pi * np.arange(apart)) / m
     cos, sin, zero = np.cos(angle), np.sin(angle), np.zeros(apart)
     rows = [[cos, sin, zero], [-sin, cos, zero], [zero, zero, zero + 1]]
@@ -256,9 +246,9 @@ def _in_plane_turns(X: Floats) -> Floats:
 
 
 def _greatest(turns: Floats, tables: Floats, axes: Floats) -> Floats:
-    """Return the turn of the greatest moments; of ties, the nearest to the world's axes.
+    """Return the turn of the greatest moments; of equal ones, the nearest to the world's axes.
 
-    ``tables`` are the moments after each turn, ``axes`` the world directions it starts from.
+    ``tables`` are the moments after each turn, ``axes`` the directions in the world before it.
     """
     alive = np.arange(len(turns))
     for exponents in _exponents():
@@ -284,7 +274,7 @@ def _turned(table: Floats, turn: Floats) -> Floats:
 
 
 def _exponents() -> list[tuple[int, int, int]]:
-    """Return moments in the order they decide: cubic, mixed third, second, fourth, fifth."""
+    """Return the moments' exponents in deciding order: cubic, mixed third, 2nd, 4th, 5th."""
     every = [(i, j, k) for i in range(6) for j in range(6) for k in range(6)]
     order = {3: 0, 2: 1, 4: 2, 5: 3}
     ranked = [(order[sum(e)], -max(e), tuple(-i for i in e), e) for e in every if sum(e) in order]

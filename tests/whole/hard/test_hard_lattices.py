@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import geounfold as gu
+from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.lattice import Lattice, measure_lattice
 from geounfold.body.noisy_lattice import disturbed_lattice
 from geounfold.body.scattered import UNEVEN, local_spacing, unevenness
-from geounfold.body.sub_blocks import parting, solid_cells, surrounded
+from geounfold.body.sub_blocks import filled_cells, missing_slabs, surrounded_gaps
 from geounfold.methods.sheet.sharpening.lattice_sites import surface_sites
 from tests.shapes import grid_cells, turned
 
@@ -29,7 +30,7 @@ def errors(body, points):
 def test_sub_blocks_become_the_cells_that_they_fill(split, sides):
     body = gu.simulate("sub_blocked", sub_blocks=split, steps=sides, width=200)
     points = turned(body.folded)
-    solid = solid_cells(points, measure_lattice(points))
+    solid = filled_cells(points, measure_lattice(points))
     assert solid.sub_blocked
     # Cells fill the body's blocks: a body of all fine blocks has the same, to the ones whose
     # parent's other blocks decide (none: a parent stands only where all its fine blocks do).
@@ -47,8 +48,8 @@ def test_sub_blocks_become_the_cells_that_they_fill(split, sides):
 
 def test_equal_blocks_are_their_own_cells():
     body = gu.simulate("plunging", blocks=6000)
-    assert solid_cells(body.folded, measure_lattice(body.folded)) is None
-    assert solid_cells(body.folded, None) is None
+    assert filled_cells(body.folded, measure_lattice(body.folded)) is None
+    assert filled_cells(body.folded, None) is None
 
 
 def test_blocks_that_no_halving_explains_stay_as_they_are():
@@ -57,7 +58,7 @@ def test_blocks_that_no_halving_explains_stay_as_they_are():
     small = k[:, 0] < 6
     thirds = np.unique(k[~small] // 3, axis=0) * 3 + 1.5
     points = np.concatenate([k[small], thirds])
-    found = solid_cells(points, Lattice(np.eye(3), np.ones(3), 1.0, np.full(3, 0.5)))
+    found = filled_cells(points, Lattice(np.eye(3), np.ones(3), 1.0, np.full(3, 0.5)))
     assert found is None or not found.sub_blocked
 
 
@@ -80,7 +81,7 @@ def test_missing_blocks_are_found_where_blocks_surround_them():
     cells = grid_cells(20, 18, 9)
     lost = rng.random(len(cells)) < 0.05
     inner = ((cells > 0) & (cells < [19, 17, 8])).all(axis=1)
-    found = {tuple(c) for c in surrounded(cells[~lost])}
+    found = {tuple(c) for c in surrounded_gaps(OccupiedCells.of(cells[~lost]))}
     assert {tuple(c) for c in cells[lost & inner]} <= found
     assert found <= {tuple(c) for c in cells[lost]}  # and nothing outside
 
@@ -90,15 +91,15 @@ def test_whole_bodies_have_no_missing_blocks():
         body = gu.simulate(case, blocks=9000)
         lattice = measure_lattice(body.folded)
         cells = np.rint((body.folded - lattice.origin) / lattice.steps).astype(int)
-        assert not len(surrounded(cells))
-        assert not len(parting(cells))
+        assert not len(surrounded_gaps(OccupiedCells.of(cells)))
+        assert not len(missing_slabs(OccupiedCells.of(cells)))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_slab_that_parts_the_body_is_found(axis):
     cells = grid_cells(15, 14, 13)
     slab = cells[:, axis] == 6
-    found = parting(cells[~slab])
+    found = missing_slabs(OccupiedCells.of(cells[~slab]))
     assert {tuple(c) for c in found} == {tuple(c) for c in cells[slab]}
 
 
@@ -106,8 +107,8 @@ def test_limbs_that_nearly_touch_are_no_missing_slab():
     """A gap one block wide between two limbs that a hinge joins."""
     cells = grid_cells(20, 12, 9)
     gap = (cells[:, 2] == 4) & (cells[:, 0] < 17)
-    assert not len(parting(cells[~gap]))
-    assert not len(surrounded(cells[~gap]))
+    assert not len(missing_slabs(OccupiedCells.of(cells[~gap])))
+    assert not len(surrounded_gaps(OccupiedCells.of(cells[~gap])))
 
 
 def test_pits_of_incomplete_models_say_nothing():

@@ -5,7 +5,7 @@ import pytest
 
 import geounfold as gu
 from geounfold.body.lattice import measure_lattice
-from geounfold.body.sub_blocks import solid_cells
+from geounfold.body.sub_blocks import filled_cells
 from geounfold.surfaces.hull import HullOptions, extract_hull
 from geounfold.synthetic import simulate
 
@@ -82,4 +82,4 @@ def test_steps_of_a_thin_sheet_are_no_missing_blocks(thickness, dip):
     # Terraces that touch along edges only, and the corners between them; up to the whole sheet
     # again was filled where fewer neighbours than 16 could make a missing block.
     body = simulate("thin", blocks=5000, thickness=thickness, lattice_dip=dip)
-    assert solid_cells(body.folded, measure_lattice(body.folded)) is None
+    assert filled_cells(body.folded, measure_lattice(body.folded)) is None

@@ -69,16 +69,21 @@ def stills_section(pictures: Iterable[str]) -> str:
     return folded_up("Still pictures", "\n".join(pictures), "stills")
 
 
+def _percent(share: float) -> str:
+    """Return a share in percent with four significant digits, so that a small one is not 0."""
+    return f"{100 * share:.4g}%"
+
+
 _FIGURES: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("inverted_folded", "inverted tetrahedra, folded", number),
     ("inverted_unfolded", "inverted tetrahedra, unfolded", number),
     ("injective", "proved one-to-one", number),
     ("outside_share", "blocks outside the control mesh", lambda v: f"{v:.3%}"),
     ("round_trip_max", "round trip, largest error (input's unit)", number),
-    ("nmd.mean", "change of neighbour distances, mean", lambda v: f"{v:.2%}"),
-    ("nmd.p95", "change of neighbour distances, 95th percentile", lambda v: f"{v:.2%}"),
-    ("volume_change.mean", "change of volume, mean", lambda v: f"{v:.2%}"),
-    ("edge_change.mean", "change of the mesh's edge lengths, mean", lambda v: f"{v:.2%}"),
+    ("nmd.mean", "change of neighbour distances, mean", _percent),
+    ("nmd.p95", "change of neighbour distances, 95th percentile", _percent),
+    ("volume_change.mean", "change of volume, mean", _percent),
+    ("edge_change.mean", "change of the mesh's edge lengths, mean", _percent),
     ("shear.max", "shear, largest", number),
     ("peak_memory_mb", "peak memory, MiB", lambda v: f"{v:,.0f}"),
 )

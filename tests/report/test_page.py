@@ -13,6 +13,7 @@ from geounfold.errors import InputError, MissingDependencyError
 from geounfold.report import report_html, verdict, write_report
 from geounfold.report.plots.rendering import check_rendering
 from geounfold.report.plots.style import ViewOptions
+from geounfold.report.sections import figures_section
 
 try:
     check_rendering()
@@ -89,6 +90,12 @@ def test_the_page_is_whole_and_loads_nothing(tmp_path):
 
 
 @needs_rendering
+def test_a_small_share_keeps_its_digits_in_the_figures():
+    page = figures_section({"volume_change": {"mean": 1.185e-05}, "nmd": {"mean": 0.123456}})
+    assert "<b>0.001185%</b>change of volume, mean" in page
+    assert "<b>12.35%</b>change of neighbour distances, mean" in page
+
+
 def test_a_summary_without_anything_still_gives_a_page():
     page = Page(report_html({}, SLAB[:8], SLAB[:8], {}, view=SMALL))
     assert not page.images  # nothing to colour by, too few blocks for 26 neighbours

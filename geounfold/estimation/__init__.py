@@ -1,8 +1,10 @@
-"""Estimation in the unfolded space: variograms, neighbourhoods, kriging, how good it is.
+"""Estimation in the unfolded space: variograms, search neighbourhoods, kriging and scores.
 
-`variogram` holds the model, `fit` finds one, `neighbourhood` chooses samples, `kriging` estimates
-points in one space, `estimate` carries samples and blocks there and back, `exploration` looks at
-the samples first, `scores` judges. The systems are solved by gstlearn (extra ``geostat``).
+`variogram` holds the model and `fit` fits one to samples. `neighbourhood` selects the samples of
+each target. `kriging` estimates points in one space; `estimate` carries samples and blocks to the
+unfolded space and calls it. `exploration` computes the tables of exploratory data analysis.
+`scores` compares estimates with true values and sums up tonnage and metal. gstlearn (extra
+``geostat``) solves the kriging systems.
 """
 
 from geounfold.estimation.estimate import Estimation, FlatSamples, estimate, flat_samples

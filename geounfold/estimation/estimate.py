@@ -1,4 +1,4 @@
-"""From samples to blocks through the unfolded space."""
+"""Estimate folded blocks from folded samples in the unfolded space."""
 
 from __future__ import annotations
 
@@ -29,36 +29,42 @@ from geounfold.io.coordinate_columns import numbers, plain_name
 from geounfold.io.result_columns import frame_points
 from geounfold.mapping.carried import Carried, checked_points
 
-_REACH = 2.0  # ranges: radii of the search where none are given
+_REACH = 2.0  # search radii in variogram ranges, if the user gives none
 _PLAIN = {"min_samples", "max_samples", "max_per_hole"}
 
 
 class Carries(Protocol):
-    """What carries points to the flat space: an UnfoldingMap."""
+    """An object that carries points to the unfolded space, such as an UnfoldingMap."""
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
-        """Return where points came to lie."""
+        """Return the images of the points."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FlatSamples:
-    """Samples carried to the unfolded space, those with a grade and an image.
+    """Samples that have a grade and an image in the unfolded space.
 
     Attributes
     ----------
     points : (n, 3) float
-        Unfolded.
+        Unfolded coordinates, in the map's unit.
     folded : (n, 3) float
+        Folded coordinates, as given.
     grades : (n,) float
+        Values of the grade, in its column's unit.
     holes : (n,) int or None
-        Numbers of the holes.
+        Number of each sample's hole; None if the holes are not known.
     stratigraphic : (n,) float
-        0 at the bottom, 1 at the top.
+        Stratigraphic height: 0 at the bottom, 1 at the top.
     rows : (n,) int
-        Rows of the samples given.
-    given, without_grade, outside : int
-        How many there were, and why some are not here.
+        Row of each sample in the table given, from 0.
+    given : int
+        Number of samples given.
+    without_grade : int
+        Number left out because the grade or a coordinate is missing.
+    outside : int
+        Number left out because they lie outside the map.
     """
 
     points: Floats
@@ -72,7 +78,7 @@ class FlatSamples:
     outside: int
 
     def facts(self) -> dict[str, int]:
-        """Return the counts, for a summary."""
+        """Return the counts of samples given, used and left out, for a summary."""
         return {
             "given": self.given,
             "used": len(self.grades),
@@ -83,24 +89,26 @@ class FlatSamples:
 
 @dataclass(frozen=True, eq=False)
 class Estimation:
-    """Estimates on the folded blocks, and how they came about.
+    """Estimates on the folded blocks, with the samples, model and rules that gave them.
 
     Attributes
     ----------
     grade : str
-        The column estimated.
+        Column of the samples that was estimated.
     blocks : Estimates
-        In the blocks' order.
+        One estimate per block, in the blocks' order.
     carried : Carried
-        Where the blocks lie in the unfolded space.
+        The blocks in the unfolded space.
     samples : FlatSamples
-        What they were estimated from.
+        The samples used.
     method : str
+        ordinary, simple or inverse_distance.
     variogram : Variogram or None
-        In the unfolded space; None for inverse distance.
+        Model in the unfolded space; None for inverse distance.
     fitted : FittedVariogram or None
-        Where the variogram was fitted.
+        Result of the fit; None if the user gave the variogram.
     neighbourhood : Neighbourhood
+        Search neighbourhood in the unfolded space.
     """
 
     grade: str
@@ -114,7 +122,7 @@ class Estimation:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The results by column name: the grade's, then _estimate, _variance, _samples, _flag."""
+        """The results by column name: the grade with _estimate, _variance, _samples or _flag."""
         b = self.blocks
         return {
             f"{self.grade}_estimate": b.estimate,
@@ -129,28 +137,28 @@ class Estimation:
         return pd.DataFrame(self.columns)
 
     def cross_validation(self) -> Estimates:
-        """Return every sample estimated from the other holes alone, by the same rules.
+        """Return every sample estimated by the same rules from the other holes only.
 
         Raises
         ------
         InputError
-            The samples' holes are not known.
+            The holes of the samples are not known.
         """
         s = self.samples
         if s.holes is None:
             raise InputError(
-                "cross-validation leaves out whole holes: name the samples' hole column"
+                "cross-validation leaves out whole holes: give the name of the samples' hole column"
             )
         return cross_validate(
             s.points, s.grades, s.holes, self.variogram, self.neighbourhood, method=self.method
         )
 
     def conservation(self, volumes: Floats, volume_ratio: Floats) -> Conservation:
-        """Return the metal of the estimates in both spaces (see `scores.conservation`)."""
+        """Return the metal of the estimates in both spaces, as `scores.conservation`."""
         return conservation(self.blocks.estimate, volumes, volume_ratio)
 
     def warnings(self) -> list[str]:
-        """Return one line for each thing that a user should know."""
+        """Return one line for each group of samples left out or blocks not estimated."""
         s, counts = self.samples, self.blocks.counts()
         lines = []
         if s.without_grade:
@@ -165,7 +173,7 @@ class Estimation:
         return lines
 
     def summary(self) -> dict[str, Any]:
-        """Return everything but the blocks, as a dict for JSON."""
+        """Return everything except the values per block, as a dict for JSON."""
         near, v = self.neighbourhood, self.blocks.estimate
         known = v[np.isfinite(v)]
         return {
@@ -209,34 +217,42 @@ def estimate(  # 11 arguments: a public name; seven of them are choices by keywo
     Parameters
     ----------
     unfolding : Unfolding or UnfoldingMap
+        The map from the folded to the unfolded space.
     samples : DataFrame
-        Coordinates (found by name), the grade and the hole; where they were drilled.
+        Folded coordinates (columns found by name), the grade and, if known, the hole.
     blocks : DataFrame or (m, 3) array, optional
-        Folded centroids; of an Unfolding its own without.
+        Folded centroids. The default is the blocks of the Unfolding; a map holds none.
     variogram : Variogram, optional
-        In the unfolded space: the first two axes of no rotation lie in the layer, the third
-        across it.  Fitted to the samples without (`fit_variogram`).
+        Model in the unfolded space. Without rotation its first two axes lie in the layer and the
+        third points across it. The default is a model fitted to the samples (`fit_variogram`).
     grade : str
-        The samples' column to estimate; rows without a value are left out and counted.
+        Column of the samples to estimate. Rows without a value are left out and counted.
     hole : str, optional
-        The column of the hole's name; found by name without, where there is one.
+        Column of the hole's name. The default is the one column with a usual name, if any.
     method : {"ordinary", "simple", "inverse_distance"}
+        Ordinary kriging, simple kriging or inverse distance.
     neighbourhood : Neighbourhood or mapping, optional
-        Or some of min_samples, max_samples, max_per_hole alone: radii then are twice the
-        variogram's ranges, along its axes.
-    mean, power, workers
-        As `krige`.
+        The search neighbourhood, or a mapping of some of its parameters. Without radii, the
+        radii are twice the variogram's ranges, along its axes.
+    mean : float, optional
+        Mean of simple kriging; the default is the mean of the samples.
+    power : float
+        Power of inverse distance.
+    workers : int
+        Number of processes at a time.
 
     Returns
     -------
     Estimation
+        In the blocks' order.
 
     Raises
     ------
     InputError
-        Samples or blocks without what is needed.
+        A column is missing or has no usable value, no sample lies in the map, or no blocks are
+        given.
     OptionError
-        A value outside its valid ones.
+        A value is outside its valid range.
     MissingDependencyError
         gstlearn is not installed (extra ``geostat``).
     """
@@ -265,12 +281,12 @@ def estimate(  # 11 arguments: a public name; seven of them are choices by keywo
 def flat_samples(
     carrier: Carries, samples: pd.DataFrame, *, grade: str, hole: str | None = None
 ) -> FlatSamples:
-    """Return samples in the unfolded space, those without a grade or an image left out.
+    """Return the samples that have a grade and an image, in the unfolded space.
 
     Raises
     ------
     InputError
-        No such column, values that are no numbers, or no sample left.
+        The column is missing, its values are not numbers, or no sample is left.
     """
     P = frame_points(samples)
     values = numbers(_column(samples, grade))
@@ -284,8 +300,8 @@ def flat_samples(
     inside = np.isfinite(carried.points).all(axis=1)
     if not inside.any():
         raise InputError(
-            f"none of the {len(rows)} samples lies in the map's reach: are they in the blocks' "
-            "coordinates and unit?"
+            f"none of the {len(rows)} samples lies within the map's reach: check that samples and "
+            "blocks have the same coordinates and unit"
         )
     kept = rows[inside]
     return FlatSamples(
@@ -316,7 +332,7 @@ def _column(frame: pd.DataFrame, name: str) -> pd.Series:
 
 
 def _holes(frame: pd.DataFrame, name: str | None) -> Ints | None:
-    """Return the number of each sample's hole; None where no column names it."""
+    """Return the number of each sample's hole; None if no single column names the hole."""
     if name is None:
         aliases = ALIASES["assay"]["hole"]
         found = [str(column) for column in frame.columns if plain_name(column) in aliases]
@@ -333,13 +349,13 @@ def _needs_radii(given: Neighbourhood | Mapping[str, Any] | None) -> bool:
 def _neighbourhood(
     given: Neighbourhood | Mapping[str, Any] | None, variogram: Variogram | None, points: Floats
 ) -> Neighbourhood:
-    """Return the neighbourhood given, its radii from the variogram where there are none."""
+    """Return the neighbourhood given, with radii from the variogram if it has none."""
     if isinstance(given, Neighbourhood):
         return given
     words = dict(given or {})
     unknown = set(words) - _PLAIN - {"radii", "rotation"}
     if unknown:
-        raise OptionError(f"a neighbourhood has no {sorted(unknown)[0]!r}")
+        raise OptionError(f"a neighbourhood has no parameter {sorted(unknown)[0]!r}")
     if "radii" not in words:
         extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
         ranges = (0.0, 0.0, 0.0) if variogram is None else variogram.ranges
@@ -349,7 +365,7 @@ def _neighbourhood(
 
 
 def _radii(ranges: Triple, extent: float) -> Triple:
-    """Return radii of twice the ranges; of a pure nugget, of the samples' extent."""
+    """Return twice the ranges; for a pure nugget, the diagonal of the samples' extent."""
     if not min(ranges) > 0:
         return extent, extent, extent
     a, b, c = (_REACH * r for r in ranges)

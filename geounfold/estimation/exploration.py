@@ -1,4 +1,4 @@
-"""Samples looked at before they estimate: tables that `report.plots.grades` draws."""
+"""Exploratory data analysis of samples: the tables that `report.plots.grades` draws."""
 
 from __future__ import annotations
 
@@ -17,24 +17,27 @@ from geounfold.geometry.mesh import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """Everything that exploratory data analysis tells of one grade.
+    """The tables of exploratory data analysis of one grade.
 
     Attributes
     ----------
     grade : str
+        Column of the samples.
     samples : FlatSamples
+        The samples used.
     histogram : DataFrame
-        See `histogram`.
+        Counts by grade, as `histogram` returns them.
     layers : DataFrame
-        Statistics by layer, from the bottom up; see `statistics`.
+        Statistics by layer from the bottom up, as `by_layer` returns them.
     variograms : dict of DataFrame
-        Experimental ones in each space (folded, unfolded); see `directional`.
+        Experimental variograms by space (folded, unfolded), as `directional` returns them.
     models : dict of FittedVariogram
-        Fitted in each space, with one range along and one across.
+        Models fitted in each space, with one range along the layer and one across it.
     swaths : dict of DataFrame
-        Along x, y and the stratigraphic coordinate; see `swath`.
+        Means along x, y and the stratigraphic coordinate, as `swath` returns them.
     contacts : dict of DataFrame
-        Across the bottom and the top; see `contact`. Distances are in thicknesses.
+        Means by distance from the bottom and the top, as `contact` returns them. Distances are
+        in thicknesses of the layer.
     """
 
     grade: str
@@ -47,7 +50,7 @@ class Exploration:
     contacts: Mapping[str, pd.DataFrame]
 
     def summary(self) -> dict[str, Any]:
-        """Return every table as plain numbers by column, for JSON; None where there is none."""
+        """Return every table as plain numbers by column, for JSON; NaN becomes None."""
         models = {
             space: {**fitted.model.facts(), "misfit": fitted.misfit}
             for space, fitted in self.models.items()
@@ -81,21 +84,24 @@ def explore(
     Parameters
     ----------
     unfolding : Unfolding or UnfoldingMap
+        The map from the folded to the unfolded space.
     samples : DataFrame
-        As `estimate` takes them.
-    grade, hole : str
-        Columns of the samples.
+        Folded coordinates, the grade and, if known, the hole, as `estimate` takes them.
+    grade : str
+        Column of the grade.
+    hole : str, optional
+        Column of the hole's name.
     layers : int
-        Slices of equal stratigraphic height from bottom to top.
+        Number of slices of equal stratigraphic height from bottom to top.
     bins : int
-        Of the histogram and of the swaths.
+        Number of bins of the histogram and of each swath.
 
     Raises
     ------
     InputError
-        Samples without what is needed, or too few for a variogram (20).
+        A column is missing or has no usable value, or a variogram has fewer than 20 samples.
     OptionError
-        Numbers of layers or bins below 1.
+        A number of layers or bins is not a whole number of 1 or more.
     """
     for name, value in (("layers", layers), ("bins", bins)):
         if not isinstance(value, int) or value < 1:
@@ -137,7 +143,7 @@ def statistics(values: Floats) -> dict[str, float]:
 
 
 def histogram(values: Floats, bins: int = 30) -> pd.DataFrame:
-    """Return columns low, high, count, share and cumulative (share up to high)."""
+    """Return a histogram: columns low, high, count, share and cumulative (share up to high)."""
     v = _known(values)
     count, edges = np.histogram(v, bins)
     share = count / len(v)
@@ -153,14 +159,16 @@ def histogram(values: Floats, bins: int = 30) -> pd.DataFrame:
 
 
 def by_layer(stratigraphic: Floats, values: Floats, layers: int = 10) -> pd.DataFrame:
-    """Return statistics by layer: columns layer (1 the lowest), from, to, and `statistics`.
+    """Return statistics by layer: columns layer (1 is the lowest), from, to and `statistics`.
 
     Parameters
     ----------
     stratigraphic : (n,) float
-        0 at the bottom, 1 at the top; what lies beyond belongs to no layer.
+        Stratigraphic height: 0 at the bottom, 1 at the top. Samples beyond belong to no layer.
     values : (n,) float
+        Grades.
     layers : int
+        Number of layers of equal stratigraphic height.
     """
     s, v = np.asarray(stratigraphic), np.asarray(values)
     layer = np.floor(s * layers)
@@ -180,8 +188,9 @@ def swath(place: Floats, values: Floats, bins: int = 30) -> pd.DataFrame:
     place : (n,) float
         Coordinate along the swath.
     values : (n,) float
+        Grades.
     bins : int
-        Slices of equal width.
+        Number of slices of equal width.
     """
     place = np.asarray(place, dtype=np.float64)
     v = np.asarray(values, dtype=np.float64)
@@ -195,22 +204,23 @@ def swath(place: Floats, values: Floats, bins: int = 30) -> pd.DataFrame:
 def contact(
     distance: Floats, values: Floats, width: float, reach: float | None = None
 ) -> pd.DataFrame:
-    """Return mean values by distance from a contact: columns as `swath`.
+    """Return mean values by distance from a contact, with the columns of `swath`.
 
     Parameters
     ----------
     distance : (n,) float
-        Signed: above 0 inside, below 0 outside.
+        Signed distance: above 0 inside, below 0 outside.
     values : (n,) float
+        Grades.
     width : float
-        Of the slices, of which one begins at the contact.
+        Width of the slices, in the unit of distance. One slice begins at the contact.
     reach : float, optional
-        Largest distance; ten slices without.
+        Largest distance on either side; the default is ten slices.
 
     Raises
     ------
     OptionError
-        A width or reach that is not above 0.
+        The width or reach is not above 0.
     """
     reach = 10 * width if reach is None else reach
     if not (width > 0 and reach > 0):
@@ -249,5 +259,5 @@ def _lists(table: pd.DataFrame) -> dict[str, list[Any]]:
 
 
 def _number(value: Any) -> Any:
-    """Return None for a float that is no number, and anything else as it is."""
+    """Return None for a float that is not finite, and any other value unchanged."""
     return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,9 +1,10 @@
-"""Variograms from samples: experimental ones, and a model fitted to them without being asked.
+"""Experimental variograms of samples, and a model fitted to them automatically.
 
-Pairs of samples are binned by how far they lie apart along and across the axes, so that every pair
-counts, whichever way holes run; the model is fitted to the bins by weighted least squares, with
-weights of pairs over the model squared (Cressie 1985, Mathematical Geology 17: 563-586) and over
-the distance squared in units of the ranges, since near samples have the weight in kriging.
+Pairs of samples are binned by their separation along and across the axes, so that every pair is
+used in whatever direction the holes run. The model is fitted to the bins by weighted least squares.
+A bin's weight is its number of pairs over the square of the model (Cressie 1985, Mathematical
+Geology 17: 563-586) and over the square of the distance in ranges, because the nearest samples
+have most weight in kriging.
 """
 
 from __future__ import annotations
@@ -23,38 +24,41 @@ from geounfold.geometry.rotations import rotation_from_angles as turned
 
 Anisotropy = Literal["isotropic", "transverse", "orthotropic"]
 ANISOTROPIES: tuple[str, ...] = get_args(Anisotropy)
-"""One range; one along the first two axes and one along the third; three."""
+"""Isotropic: one range; transverse: one in the plane of axes 1 and 2, one along 3; else three."""
 
 MOST_SAMPLES = 3000
-"""Of more, so many are drawn, always the same ones: pairs grow with their square."""
+"""Most samples used: pairs grow with their square. From more, a fixed seed draws so many."""
 
 FEWEST_SAMPLES = 20
-"""With fewer there is no variogram."""
+"""Fewest samples of which a variogram is fitted."""
 
 _BINS = {1: 24, 2: 12, 3: 7}  # bins along each axis
-_FINER = 1.5  # exponent of the bins' edges: they are finer near none
-_PAIRS = 10  # fewest pairs of a bin
-_SHARE = 0.5  # of the extent: longest lags
-_NUGGET = 1e-3  # least share of the sill beside a gaussian structure
-_STARTS = (0.15, 0.5)  # ranges to begin with, of the longest lags
-_NEAR = 0.1  # squared ranges within which bins matter alike
-_ROUNDS = 3  # of weights: of equal ones, then of the model so far
-_ROWS = 256  # samples whose pairs are held at a time
+_FINER = 1.5  # exponent of the bins' edges: bins are narrower at short distances
+_PAIRS = 10  # fewest pairs in a bin that is used
+_SHARE = 0.5  # longest lag, as a share of the samples' extent
+_NUGGET = 1e-3  # smallest nugget beside a gaussian structure, as a share of the sill
+_STARTS = (0.15, 0.5)  # starting ranges, as shares of the longest lags
+_NEAR = 0.1  # squared ranges, added to a bin's squared distance to limit the weight of near bins
+_ROUNDS = 3  # fits: one with equal weights, the others with weights of the last model
+_ROWS = 256  # samples whose pairs are held in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
 class FittedVariogram:
-    """A fitted model and what it was fitted to.
+    """A fitted model and the bins that it was fitted to.
 
     Attributes
     ----------
     model : Variogram
+        The fitted model.
     cells : DataFrame
-        The bins: columns h1, h2, h3 (mean distances along the axes; the in-plane distance stands
-        in h1 of transverse anisotropy, the distance in h1 of none), gamma, pairs, model.
+        The bins: columns h1, h2, h3, gamma, pairs and model. h1 to h3 are mean distances along
+        the axes. With transverse anisotropy h1 is the distance in the plane; with none it is the
+        whole distance.
     misfit : float
-        Root mean square of gamma over the model's, less 1, weighted by pairs.
+        Root mean square of gamma over the model's gamma, less 1, weighted by pairs.
     anisotropy : str
+        isotropic, transverse or orthotropic.
     """
 
     model: Variogram
@@ -76,30 +80,33 @@ def fit_variogram(
     Parameters
     ----------
     points : (n, 3) float
+        Samples in the unfolded space.
     values : (n,) float
+        Grades.
     anisotropy : {"transverse", "isotropic", "orthotropic"}
         Transverse: one range along the layer (the first two axes) and one across it.
     rotation : (float, float, float)
-        Of the axes, as `Variogram` has it.
+        Bearing, plunge and dip of the axes, degrees, as in `Variogram`.
     kinds : names
-        Structures to choose from; the one that fits best is taken.
+        Structures to try; the one with the smallest misfit is returned.
 
     Returns
     -------
     FittedVariogram
+        The model of the smallest misfit, with its bins.
 
     Raises
     ------
     InputError
-        Fewer than 20 samples, values that do not vary, or too few pairs.
+        There are fewer than 20 samples or too few pairs, or all values are equal.
     OptionError
-        An anisotropy or kind that does not exist.
+        The anisotropy or a kind is not a valid one.
 
     Examples
     --------
     >>> rng = np.random.default_rng(0)
     >>> fitted = fit_variogram(rng.random((500, 3)), rng.normal(size=500))
-    >>> fitted.model.nugget > 0.7  # of noise
+    >>> fitted.model.nugget > 0.7  # noise has no correlation
     True
     """
     P, v = _checked(points, values, anisotropy, kinds)
@@ -110,7 +117,7 @@ def fit_variogram(
     if len(cells) < 6:
         raise InputError(
             f"only {len(cells)} bins of {_PAIRS} pairs or more: too few samples for a variogram; "
-            "give the model"
+            "give a variogram model"
         )
     best = min((_fitted(cells, kind, anisotropy, v) for kind in kinds), key=lambda f: f[0])
     misfit, kind, nugget, sill, ranges = best
@@ -129,19 +136,22 @@ def directional(
     rotation: Triple = (0.0, 0.0, 0.0),
     tolerance: float = 22.5,
 ) -> pd.DataFrame:
-    """Return experimental variograms along the three axes, in the first two's plane and in all.
+    """Return experimental variograms along each axis, in the plane of axes 1 and 2, and in all.
 
     Parameters
     ----------
     points : (n, 3) float
+        Samples.
     values : (n,) float
+        Grades.
     lags : int
-        Of half the extent along each direction.
+        Number of lags in half the extent along each direction.
     rotation : (float, float, float)
-        Of the axes, as `Variogram` has it.
+        Bearing, plunge and dip of the axes, degrees, as in `Variogram`.
     tolerance : float
-        Degrees off the direction.  Pairs in the plane also lie no more than one lag of the third
-        axis off it, those along that axis no more than one lag of the plane.
+        Largest angle between a pair and the direction, degrees. A pair in the plane lies at most
+        one lag of the third axis off it. A pair along that axis lies at most one lag of the plane
+        off it.
 
     Returns
     -------
@@ -151,7 +161,7 @@ def directional(
     Raises
     ------
     InputError
-        As `fit_variogram`.
+        There are fewer than 20 samples, or all values are equal.
     """
     P, v = _checked(points, values, "transverse", KINDS)
     P, v = _thinned(P, v)
@@ -202,7 +212,7 @@ def directional(
 def _checked(
     points: Floats, values: Floats, anisotropy: str, kinds: Sequence[str]
 ) -> tuple[Floats, Floats]:
-    """Return samples in an order of their own, or raise."""
+    """Return the finite samples sorted by place; raise if no variogram can be fitted to them."""
     if anisotropy not in ANISOTROPIES:
         raise OptionError(f"anisotropy {anisotropy!r} is not one of: {', '.join(ANISOTROPIES)}")
     for kind in kinds:
@@ -216,7 +226,7 @@ def _checked(
     if len(v) < FEWEST_SAMPLES:
         raise InputError(f"only {len(v)} samples: a variogram needs at least {FEWEST_SAMPLES}")
     if not np.ptp(v) > 0:
-        raise InputError("all samples have the same value: there is no variogram")
+        raise InputError("all samples have the same value: no variogram can be fitted")
     order = np.lexsort((v, *P.T))
     return P[order], v[order]
 
@@ -239,7 +249,7 @@ def _pairs(local: Floats, v: Floats) -> Iterator[tuple[Floats, Floats]]:
 
 
 def _cells(local: Floats, v: Floats, anisotropy: str) -> pd.DataFrame:
-    """Return the bins that hold pairs enough."""
+    """Return the bins that hold enough pairs."""
     axes = {"isotropic": 1, "transverse": 2, "orthotropic": 3}[anisotropy]
     bins = _BINS[axes]
     extent = np.ptp(local, axis=0)
@@ -278,7 +288,7 @@ def _cells(local: Floats, v: Floats, anisotropy: str) -> pd.DataFrame:
 
 
 def _lags(h: Floats, anisotropy: str) -> Floats:
-    """Return the distances that pairs are binned by, (p, axes)."""
+    """Return the distances (p, axes) by which pairs are binned."""
     if anisotropy == "isotropic":
         return np.asarray(np.linalg.norm(h, axis=1)[:, None])
     if anisotropy == "transverse":
@@ -287,7 +297,7 @@ def _lags(h: Floats, anisotropy: str) -> Floats:
 
 
 def _three(ranges: Floats, anisotropy: str) -> Triple:
-    """Return a range for each axis."""
+    """Return one range per axis."""
     which = {"isotropic": [0, 0, 0], "transverse": [0, 0, 1], "orthotropic": [0, 1, 2]}[anisotropy]
     a, b, c = np.asarray(ranges)[which].tolist()
     return a, b, c
@@ -328,14 +338,14 @@ def _fitted(
 
 
 def _fading(H: Floats, ranges: Floats | Triple) -> Floats:
-    """Return what weights of bins are divided by: far bins have most pairs and matter least."""
+    """Return the divisors of the bins' weights: squared distances in ranges, plus `_NEAR`."""
     return np.asarray(_NEAR + ((H / np.asarray(ranges)) ** 2).sum(axis=1))
 
 
 def _best_sills(
     H: Floats, gamma: Floats, root: Floats, kind: str, x: Floats, anisotropy: str
 ) -> tuple[float, float, Floats]:
-    """Return the nugget and sill of least squares for given ranges, and the model's gamma."""
+    """Return the nugget and sill by least squares for given ranges, and the model's gamma."""
     ranges = np.asarray(_three(np.exp(x), anisotropy))
     shape = 1 - correlation(kind, np.linalg.norm(H / ranges, axis=1))
     A = np.column_stack([np.ones(len(shape)), shape])

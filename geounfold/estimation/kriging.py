@@ -1,6 +1,6 @@
-"""Estimates at points from samples around them: kriging and inverse distance.
+"""Estimates at points from the samples around them: kriging and inverse distance.
 
-Everything here is in one space; `geounfold.estimation.estimate` carries samples and blocks there.
+Samples and targets lie in one space; `geounfold.estimation.estimate` carries them there.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE = (
     "unsolvable",
 )
 FLAGS = (ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE)
-"""What became of a target."""
+"""Outcome of a target: estimated, or the reason why not."""
 
-_CHUNK = 8_192  # targets looked up at a time; a multiple of the islands of a call
-_LIFE = 16  # chunks that one process solves
+_CHUNK = 8_192  # targets looked up at a time; a multiple of the targets of one call
+_LIFE = 16  # chunks that one process solves before it ends, which frees its memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class Estimates:
     Attributes
     ----------
     estimate : (m,) float
-        NaN where there is none: see `flag`.
+        Estimates in the values' unit; NaN if `flag` is not estimated.
     variance : (m,) float
         Kriging variance, in the values' unit squared; NaN for inverse distance.
     samples : (m,) int
-        How many were found.
+        Number of samples found around each target.
     flag : (m,) str
         estimated, too_few_samples, outside_map or unsolvable.
     """
@@ -63,17 +63,17 @@ class Estimates:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples in an order of their own, no two in one place.
+    """Samples sorted by place, each place once.
 
     Attributes
     ----------
     points : (n, 3) float
     values : (n,) float
-        Means of those in one place.
+        Mean of the samples in each place.
     holes : (n,) int or None
-        Numbers of the holes, in the order of their names; of those in one place the lowest.
+        Number of the hole, in the order of the holes' names; the lowest of those in one place.
     merged : int
-        How many were merged into others.
+        Number of samples merged into others.
     """
 
     points: Floats
@@ -83,12 +83,12 @@ class Samples:
 
 
 def gathered(points: Floats, values: Floats, holes: Ints | None = None) -> Samples:
-    """Return samples sorted by their place, those in one place as one.
+    """Return the samples sorted by place, with those in one place merged into their mean.
 
     Raises
     ------
     InputError
-        No samples, arrays of unequal lengths, or values that are not finite.
+        There are no samples, arrays have unequal lengths, or a value is not finite.
     """
     P, v = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if P.ndim != 2 or P.shape[1] != 3 or v.shape != (len(P),):
@@ -101,7 +101,7 @@ def gathered(points: Floats, values: Floats, holes: Ints | None = None) -> Sampl
         raise InputError("samples must have finite coordinates and values; leave the others out")
     places, group = np.unique(P, axis=0, return_inverse=True)
     group = group.ravel()
-    order = np.lexsort((v, group))  # sums of equal bits, however the rows came
+    order = np.lexsort((v, group))  # so that sums do not depend on the order of the input rows
     count = np.bincount(group)
     mean = np.bincount(group[order], v[order]) / count
     mean = np.where(count == 1, v[order][np.cumsum(count) - 1], mean)
@@ -131,37 +131,39 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
     Parameters
     ----------
     points : (n, 3) float
-        The samples; those in one place are taken as one, of their mean.
+        Samples; those in one place are merged into their mean.
     values : (n,) float
+        Grades.
     targets : (m, 3) float
-        Estimated as points.  Rows of NaN are outside_map.
+        Points to estimate. Rows of NaN get the flag outside_map.
     variogram : Variogram or None
-        None for inverse distance only.
+        Model; None for inverse distance only.
     near : Neighbourhood
-        Inverse distances are measured in its radii.
+        Search neighbourhood. Inverse distances are measured in units of its radii.
     method : {"ordinary", "simple", "inverse_distance"}
-        Ordinary kriging leaves the mean unknown; simple kriging takes it as given.
+        Ordinary kriging has an unknown mean, simple kriging a given one.
     holes : (n,) int, optional
-        The hole of each sample, for `max_per_hole` and `leave_out`.
+        Number of each sample's hole, needed by `max_per_hole` and `leave_out`.
     leave_out : (m,) int, optional
-        A hole whose samples do not estimate the target.
+        For each target, the hole whose samples are not used.
     mean : float, optional
-        Of simple kriging; the samples' mean without.
+        Mean of simple kriging; the default is the mean of the samples.
     power : float
-        Of inverse distance.
+        Power of inverse distance, above 0.
     workers : int
-        Processes at a time.  More than 131,072 targets go to other processes in any case.
+        Number of processes at a time. Above 131,072 targets other processes are used in any case.
 
     Returns
     -------
     Estimates
+        In the targets' order.
 
     Raises
     ------
     InputError
-        Samples that cannot be used.
+        The samples cannot be used.
     OptionError
-        A method that does not exist, or one that lacks what it needs.
+        The method is not a valid one, or needs a variogram or holes that are not given.
     MissingDependencyError
         gstlearn is not installed.
     """
@@ -172,7 +174,7 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
         mean = float(given.values.mean())
     T = np.asarray(targets, dtype=np.float64).reshape(-1, 3)
     there = np.flatnonzero(np.isfinite(T).all(axis=1))
-    # In an order of their own: the same bits, however the rows came.
+    # Sorted, so that the answer does not depend on the order of the input rows.
     there = there[np.lexsort(T[there].T)]
     job = _Job(given, variogram, near, method, mean if method == "simple" else None, power)
     parts = _run(job, T[there], None if leave_out is None else leave_out[there], workers)
@@ -199,16 +201,16 @@ def cross_validate(
     near: Neighbourhood,
     **how: object,
 ) -> Estimates:
-    """Estimate every sample from the other holes' samples (whole-hole cross-validation).
+    """Estimate every sample from the samples of the other holes (whole-hole cross-validation).
 
-    Parameters are those of `krige`.
+    The parameters are those of `krige`.
     """
     holes = np.asarray(holes, dtype=np.int64)
     return krige(points, values, points, variogram, near, holes=holes, leave_out=holes, **how)  # type: ignore[arg-type]
 
 
 def hole_numbers(names: Sequence[object] | np.ndarray) -> Ints:
-    """Return a number for each name, in the names' order as texts.
+    """Return a number for each name, from 0 in the alphabetical order of the names.
 
     >>> hole_numbers(["B", "A", "B"]).tolist()
     [1, 0, 1]
@@ -223,7 +225,7 @@ Part = tuple[Floats, Floats, Ints, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class _Job:
-    """All that a process needs to estimate targets."""
+    """Samples, model and rules by which a process estimates targets."""
 
     given: Samples
     variogram: Variogram | None
@@ -253,7 +255,7 @@ class _Job:
             return answer, np.full(len(answer), np.nan)
         model = self.variogram
         offset = offset @ model.axes.T
-        # Mean and sill of 1: what the library takes for nothing does not depend on the unit.
+        # Scaled to a mean of 0 and a sill of 1: the library's thresholds do not depend on the unit.
         scale, sill = float(np.sqrt(model.sill)), model.sill
         centre = float(self.given.values.mean()) if self.mean is None else self.mean
         answer, variance = gstlearn.krige(
@@ -269,7 +271,7 @@ class _Job:
         return answer * scale + centre, variance * sill
 
 
-_WORST = 20.0  # sills: far above what ordinary kriging can have, so its system was not solved
+_WORST = 20.0  # sills; a variance above it shows that the kriging system was not solved
 
 
 def _run(job: _Job, targets: Floats, own: Ints | None, workers: int) -> list[Part]:
@@ -298,13 +300,13 @@ def _check(
     power: float,
     workers: int,
 ) -> None:
-    """Raise OptionError where what is asked for does not go together."""
+    """Raise OptionError if the method lacks something that it needs."""
     if method not in METHODS:
         raise OptionError(f"method {method!r} is not one of: {', '.join(METHODS)}")
     if variogram is None and method != "inverse_distance":
         raise OptionError(f"{method} kriging needs a variogram")
     if holes is None and (near.max_per_hole is not None or leave_out is not None):
-        raise OptionError("a limit per hole needs the samples' holes")
+        raise OptionError("max_per_hole needs the hole of each sample")
     if not (np.isfinite(power) and power > 0):
         raise OptionError(f"the power of inverse distance must be above 0, not {power}")
     if not isinstance(workers, int) or workers < 1:
@@ -312,5 +314,5 @@ def _check(
 
 
 def estimated(flag: np.ndarray) -> Bools:
-    """Return which flags say that there is an estimate."""
+    """Return which targets have an estimate, by their flags."""
     return np.asarray(flag == ESTIMATED, dtype=bool)

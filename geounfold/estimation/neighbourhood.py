@@ -1,4 +1,4 @@
-"""Which samples estimate a target: search ellipsoid, fewest and most, most of one hole."""
+"""Search neighbourhood: the samples that estimate each target."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from geounfold.geometry.rotations import rotation_from_angles as turned
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbourhood:
-    """A moving neighbourhood.
+    """A moving search neighbourhood.
 
     Parameters
     ----------
     radii : (float, float, float)
-        Of the search ellipsoid along its axes, in the points' unit.
+        Radii of the search ellipsoid along its axes, in the points' unit.
     rotation : (float, float, float)
-        Bearing, plunge and dip of the axes, degrees, as `Variogram` has them.
+        Bearing, plunge and dip of the axes, degrees, as in `Variogram`.
     min_samples : int
-        Targets with fewer are not estimated.
+        Fewest samples; targets with fewer are not estimated.
     max_samples : int
-        The nearest so many, in the ellipsoid's measure.
+        Most samples; the nearest are used, by distance in units of the radii.
     max_per_hole : int, optional
-        The nearest so many of one hole, and then the next holes' samples.
+        Most samples of one hole; the nearest are used. The default is no limit.
 
     Raises
     ------
     OptionError
-        A value outside its valid ones.
+        A value is outside its valid range.
     """
 
     radii: Triple
@@ -71,13 +71,14 @@ class Neighbourhood:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The samples of each target, the nearest first.
+    """The samples of each target, nearest first.
 
     Attributes
     ----------
     rows : (m, k) int
         Rows of the samples; 0 beyond the count.
     counts : (m,) int
+        Number of samples of each target.
     """
 
     rows: Ints
@@ -90,11 +91,12 @@ class Search:
     Parameters
     ----------
     points : (n, 3) float
-        The samples' places, in an order that does not depend on how they were given: of samples
-        equally far the tree takes the same then.
+        Samples, sorted by place. Among samples at the same distance the tree chooses by row, so
+        sorted rows make the choice independent of the order of the input.
     holes : (n,) int or None
-        The hole of each.
+        Number of each sample's hole.
     near : Neighbourhood
+        Radii and limits of the search.
     """
 
     def __init__(self, points: Floats, holes: Ints | None, near: Neighbourhood) -> None:
@@ -108,8 +110,9 @@ class Search:
         Parameters
         ----------
         targets : (m, 3) float
+            Points to estimate.
         own : (m,) int, optional
-            A hole whose samples are left out, for cross-validation; -1 for none.
+            Hole whose samples are left out in cross-validation; -1 for none.
         """
         near, places = self._near, self._near.measured(targets)
         m, most = len(targets), min(near.max_samples, self._tree.n)
@@ -123,7 +126,7 @@ class Search:
             keep = self._allowed(found, None if own is None else own[left])
             keep &= np.cumsum(keep, axis=1) <= most
             count = keep.sum(axis=1)
-            # Rows that were cut short at the last one asked for may have more to give.
+            # A row whose last candidate lies within reach may have more samples: search it again.
             short = (count < most) & (found[:, -1] < self._tree.n) & (asked < self._tree.n)
             done = np.flatnonzero(~short)
             rows[left[done]] = _packed(found[done], keep[done], most)
@@ -133,7 +136,7 @@ class Search:
         return Found(rows, counts)
 
     def _allowed(self, found: Ints, own: Ints | None) -> Bools:
-        """Return which samples found, (m, k) nearest first, may be used."""
+        """Return which of the samples found, (m, k) nearest first, may be used."""
         keep: Bools = found < self._tree.n
         if self._holes is None:
             return keep
@@ -147,7 +150,7 @@ class Search:
 
 
 def _turn(groups: Ints) -> Ints:
-    """Return how many earlier entries of its row each entry equals."""
+    """Return for each entry the number of equal entries before it in its row."""
     order = np.argsort(groups, axis=1, kind="stable")
     ordered = np.take_along_axis(groups, order, axis=1)
     place = np.broadcast_to(np.arange(groups.shape[1]), groups.shape)
@@ -160,7 +163,7 @@ def _turn(groups: Ints) -> Ints:
 
 
 def _packed(found: Ints, keep: Bools, most: int) -> Ints:
-    """Return the kept entries of each row moved to its front, (m, most); 0 behind them."""
+    """Return the kept entries of each row moved to its front, (m, most), followed by zeros."""
     order = np.argsort(~keep, axis=1, kind="stable")[:, :most]
     kept = np.take_along_axis(keep, order, axis=1)
     out: Ints = np.where(kept, np.take_along_axis(found, order, axis=1), 0)

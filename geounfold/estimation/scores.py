@@ -1,4 +1,4 @@
-"""How good estimates are: against true values, and as tonnes and metal."""
+"""Scores of estimates against true values, tonnage above cut-offs, and metal in both spaces."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ class Scores:
     Attributes
     ----------
     count : int
-        Of targets with an estimate.
+        Number of targets with an estimate.
     missing : int
-        Of those without one, which are not counted in the others.
+        Number of targets without one; the scores do not include them.
     rmse : float
-        Root mean square error.
+        Root mean square error, in the values' unit.
     bias : float
-        Mean error, estimate less truth.
+        Mean of estimate less truth, in the values' unit.
     slope : float
-        Of the regression of truth on estimate: 1 without conditional bias.
+        Slope of the regression of truth on estimate; 1 without conditional bias.
     correlation : float
+        Pearson correlation of truth and estimate.
     """
 
     count: int
@@ -40,12 +41,12 @@ class Scores:
 
 
 def score(truth: Floats, estimate: Floats) -> Scores:
-    """Return how estimates (n,) compare with true values (n,).
+    """Return the scores of estimates (n,) against true values (n,).
 
     Raises
     ------
     InputError
-        Unequal lengths, or fewer than two estimates.
+        The lengths are unequal, or there are fewer than two estimates.
 
     Examples
     --------
@@ -59,7 +60,7 @@ def score(truth: Floats, estimate: Floats) -> Scores:
     missing = int(np.count_nonzero(~there))
     t, e = t[there], e[there]
     if len(t) < 2:
-        raise InputError(f"only {len(t)} estimates to compare with true values")
+        raise InputError(f"only {len(t)} estimates to compare with true values, but 2 are needed")
     error = e - t
     spread = float(e.var())
     together = float(((t - t.mean()) * (e - e.mean())).mean())
@@ -77,20 +78,21 @@ def score(truth: Floats, estimate: Floats) -> Scores:
 def grade_tonnage(
     values: Floats, cutoffs: Sequence[float], volumes: Floats | None = None
 ) -> pd.DataFrame:
-    """Return what lies at or above cut-offs.
+    """Return tonnage, grade and metal at or above each cut-off.
 
     Parameters
     ----------
     values : (n,) float
-        Grades; those that are NaN are left out.
+        Grades; NaN is left out.
     cutoffs : floats
+        Cut-off grades.
     volumes : (n,) float, optional
-        Of the blocks; 1 each without.
+        Volumes of the blocks; the default is 1 each.
 
     Returns
     -------
     DataFrame
-        Columns cutoff, tonnage (share of the volume), grade (mean above, NaN where nothing is),
+        Columns cutoff, tonnage (share of the volume), grade (mean above, NaN if there is none),
         metal (volume times grade).
     """
     v = np.asarray(values, dtype=np.float64)
@@ -119,11 +121,11 @@ class Conservation:
     Attributes
     ----------
     folded, unfolded : float
-        Sums of volume times grade.
+        Sum of volume times grade in each space.
     metal_change, volume_change : float
         Unfolded over folded, less 1.
     blocks : int
-        With an estimate and a volume in both spaces.
+        Number of blocks with an estimate and a volume in both spaces.
     """
 
     folded: float
@@ -139,16 +141,16 @@ def conservation(values: Floats, volumes: Floats, volume_ratio: Floats) -> Conse
     Parameters
     ----------
     values : (n,) float
-        Grades; blocks without one are left out.
+        Grades; blocks without a grade are left out.
     volumes : (n,) float
-        Of the folded blocks.
+        Volumes of the folded blocks.
     volume_ratio : (n,) float
-        Unfolded over folded, as `unfold` reports it.
+        Unfolded over folded volume, as `unfold` reports it.
 
     Raises
     ------
     InputError
-        No block has all three, or the folded sum is 0.
+        No block has all three values, or the folded sum is 0.
     """
     v, size, ratio = (np.asarray(a, dtype=np.float64) for a in (values, volumes, volume_ratio))
     there = np.isfinite(v) & np.isfinite(size) & np.isfinite(ratio)

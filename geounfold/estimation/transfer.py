@@ -1,9 +1,9 @@
-"""Values moved from the blocks of one space to those of the other, weighted by volume.
+"""Transfer of values between the blocks of both spaces, weighted by volume.
 
-Every target block is cut into equal parts; the centre of each is carried to the source's space,
-where the source block that holds it gives its value.  A target block gets the mean over its parts.
-Where the map keeps volumes, the sum of volume times value is kept too, but for parts that no
-source block holds, which are counted.
+Every target block is cut into equal parts. The centre of each part is carried to the source's
+space and takes the value of the source block that contains it. A target block gets the mean over
+its parts. If the map keeps volumes, the transfer keeps the sum of volume times value, except for
+parts outside every source block, which are counted.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from geounfold.errors import InputError, OptionError
 from geounfold.geometry.mesh import Bools, Floats
 
 SPLIT = 4
-"""Parts of a block along each axis: 64 in all, as block kriging takes."""
+"""Parts of a block along each axis: 64 in all, a usual discretisation in block kriging."""
 
-_POINTS = 1 << 18  # parts carried at once
+_POINTS = 1 << 18  # most parts carried at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Transfer:
     share : (n, k) float
         Share of each block's parts that have a value, 0 to 1.
     volumes : (n,) float
-        Of the target's blocks.
+        Volumes of the target's blocks.
     total : (k,) float
         Sum of volume times value over the source's blocks.
     """
@@ -47,12 +47,12 @@ class Transfer:
 
     @property
     def assigned(self) -> Bools:
-        """Whether each block has any value, (n, k)."""
+        """Whether each block has a value, (n, k)."""
         return np.asarray(self.share > 0)
 
     @property
     def carried(self) -> Floats:
-        """Sum of volume, share and value over the target's blocks, (k,); compare with total."""
+        """Sum of volume times share times value over the target's blocks, (k,), as `total`."""
         known = np.where(self.assigned, self.means, 0.0)
         out: Floats = (self.volumes[:, None] * self.share * known).sum(axis=0)
         return out
@@ -73,21 +73,21 @@ def transfer(
     source : BlockModel
         Blocks that have values: a grid estimated in the unfolded space, or folded blocks.
     values : (m, k) float
-        Theirs; NaN where a block has none.
+        Values of the source's blocks; NaN if a block has none.
     target : BlockModel
-        Blocks of the other space, n of them.
+        The n blocks of the other space.
     carry : callable
-        Carries points (p, 3) of the target's space to the source's; NaN where there is no image:
-        ``unfolding.to_flat`` for folded targets, ``to_folded`` for unfolded ones.
+        Carries points (p, 3) from the target's space to the source's; NaN if a point has no
+        image. ``unfolding.to_flat`` for folded targets, ``to_folded`` for unfolded ones.
     split : int
-        Parts along each axis of a target block.
+        Number of parts along each axis of a target block.
 
     Raises
     ------
     InputError
-        Values whose rows do not belong to the source's blocks, or that are infinite.
+        The values do not have one row per source block, or a value is infinite.
     OptionError
-        A split below 1.
+        The split is below 1.
 
     Examples
     --------
@@ -100,13 +100,13 @@ def transfer(
     given = np.asarray(values, dtype=np.float64)
     if given.ndim != 2 or len(given) != len(source):
         raise InputError(
-            f"values must have shape ({len(source)}, k), one row a source block, but have "
+            f"values must have shape ({len(source)}, k), one row per source block, but have "
             f"{given.shape}"
         )
     if np.isinf(given).any():
-        raise InputError("values must be finite, or NaN where a block has none")
+        raise InputError("values must be finite, or NaN if a block has none")
     if split < 1:
-        raise OptionError(f"a block is split into at least 1 part along each axis, not {split}")
+        raise OptionError(f"split must be 1 or more parts along each axis, not {split}")
     parts = split**3
     out = np.full((len(target), given.shape[1]), np.nan)
     share = np.zeros_like(out)

@@ -14,12 +14,12 @@ from geounfold.geometry.mesh import Floats
 from geounfold.geometry.rotations import rotation_from_angles as turned
 
 KINDS = ("spherical", "exponential", "gaussian")
-"""The structures."""
+"""Kinds of structures."""
 
 LEAST_NUGGET = 1e-4
-"""Share of the sill below which systems of a gaussian model alone cannot be solved."""
+"""Smallest nugget of a purely gaussian model, as a share of the sill; below it systems fail."""
 
-_LEFT = np.log(20.0)  # 5 % of the covariance is left at the range
+_LEFT = np.log(20.0)  # exponent that leaves 5 % of the covariance at the range
 
 Triple = tuple[float, float, float]
 
@@ -27,8 +27,8 @@ Triple = tuple[float, float, float]
 def correlation(kind: str, h: Floats) -> Floats:
     """Return the correlation of a structure at distances in units of its range.
 
-    Spherical: 1 - 3 h / 2 + h^3 / 2, none from 1 on; exponential: 20^-h; gaussian: 20^-h^2: 5 %
-    is left at the range (Chiles and Delfiner 2012, section 2.5).
+    Spherical: 1 - 3 h / 2 + h^3 / 2, and 0 beyond the range. Exponential: 20^-h; gaussian:
+    20^-h^2. Both leave 5 % at the range (Chiles and Delfiner 2012, section 2.5).
 
     Examples
     --------
@@ -49,15 +49,15 @@ class Structure:
     ----------
     kind : {"spherical", "exponential", "gaussian"}
     sill : float
-        Its part of the variance, above 0.
+        Variance of the structure, above 0.
     ranges : (float, float, float)
-        Along the model's axes, in the points' unit.  In the unfolded space with no rotation: two
-        along the layer and one across it.
+        Ranges along the model's axes, in the points' unit. In the unfolded space without
+        rotation, the first two lie along the layer and the third across it.
 
     Raises
     ------
     OptionError
-        A kind that does not exist; a sill or range that is not above 0.
+        The kind is not a valid one, or a sill or range is not above 0.
     """
 
     kind: str
@@ -82,17 +82,18 @@ class Variogram:
     Parameters
     ----------
     nugget : float
-        Variance at no distance, 0 or more.
+        Variance at distance 0, 0 or more.
     structures : tuple of Structure
+        Nested structures.
     rotation : (float, float, float)
-        Bearing, plunge and dip of the axes, degrees, as block models have them: the second axis
-        points to the bearing (clockwise from +y) and down by the plunge; the first turns down
-        about it by the dip.
+        Bearing, plunge and dip of the axes, degrees, as in block models. The second axis points
+        to the bearing (clockwise from +y) and down by the plunge. The first axis is turned down
+        about the second by the dip.
 
     Raises
     ------
     OptionError
-        A value outside its valid ones, no sill at all, or a gaussian structure without a nugget.
+        A value is outside its valid range, the sill is 0, or a gaussian model lacks a nugget.
     """
 
     nugget: float
@@ -111,17 +112,17 @@ class Variogram:
         if smooth and self.nugget < LEAST_NUGGET * self.sill:
             raise OptionError(
                 f"a gaussian structure needs a nugget of at least {LEAST_NUGGET:g} of the sill, "
-                f"here {LEAST_NUGGET * self.sill:.3g}: systems cannot be solved without"
+                f"here {LEAST_NUGGET * self.sill:.3g}: kriging systems cannot be solved without it"
             )
 
     @property
     def sill(self) -> float:
-        """The whole variance, nugget included."""
+        """The whole variance, including the nugget."""
         return self.nugget + sum(s.sill for s in self.structures)
 
     @property
     def ranges(self) -> Triple:
-        """The greatest range along each axis; 0 of a pure nugget."""
+        """The largest range along each axis; 0 for a pure nugget."""
         if not self.structures:
             return 0.0, 0.0, 0.0
         a, b, c = np.max([s.ranges for s in self.structures], axis=0).tolist()
@@ -133,7 +134,7 @@ class Variogram:
         return turned(*self.rotation)
 
     def gamma(self, separation: Floats) -> Floats:
-        """Return the semivariance, (n,), at separations (n, 3); 0 where there is none."""
+        """Return the semivariance (n,) at separations (n, 3); it is 0 at separation 0."""
         h = np.asarray(separation, dtype=np.float64) @ self.axes.T
         left = np.zeros(len(h))
         for s in self.structures:
@@ -152,23 +153,25 @@ class Variogram:
 
 
 def from_facts(facts: Any, source: str = "the variogram") -> Variogram:
-    """Return the model of a dict: nugget, structures (kind, sill, ranges), rotation.
+    """Return the model of a dict of nugget, structures (kind, sill, ranges) and rotation.
 
     Raises
     ------
     OptionError
-        A word that is missing or unknown, or a value outside its valid ones.
+        A key is missing or unknown, or a value is outside its valid range.
     """
     if not isinstance(facts, Mapping):
         raise OptionError(f"{source}: must be an object with nugget, structures and rotation")
     known = {"nugget", "structures", "rotation"}
     if set(facts) - known or "structures" not in facts:
-        raise OptionError(f"{source}: needs structures, and may have nugget and rotation, no other")
+        raise OptionError(
+            f"{source}: needs structures; besides it may have nugget and rotation only"
+        )
     structures = facts["structures"]
     if not isinstance(structures, list | tuple) or not all(
         isinstance(s, Mapping) and set(s) == {"kind", "sill", "ranges"} for s in structures
     ):
-        raise OptionError(f"{source}: each structure needs kind, sill and ranges, and no other")
+        raise OptionError(f"{source}: each structure needs exactly kind, sill and ranges")
     try:
         parts = tuple(Structure(s["kind"], s["sill"], s["ranges"]) for s in structures)
         return Variogram(facts.get("nugget", 0.0), parts, facts.get("rotation", (0.0, 0.0, 0.0)))
@@ -177,12 +180,12 @@ def from_facts(facts: Any, source: str = "the variogram") -> Variogram:
 
 
 def from_json(text: str, source: str) -> Variogram:
-    """Return the model in JSON: itself, or under ``variogram`` as in a summary.
+    """Return the model in a JSON text: the model itself, or a summary with key ``variogram``.
 
     Raises
     ------
     OptionError
-        Not JSON, or not such a model.
+        The text is not JSON, or not a valid model.
     """
     try:
         facts = json.loads(text)
@@ -194,7 +197,7 @@ def from_json(text: str, source: str) -> Variogram:
 
 
 def numbers(what: str, values: Any, count: int) -> tuple[Any, ...]:
-    """Return so many finite numbers as floats, or raise OptionError."""
+    """Return the values as `count` finite floats, or raise OptionError."""
     try:
         found = tuple(float(v) for v in values)
     except (TypeError, ValueError) as error:

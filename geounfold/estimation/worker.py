@@ -1,8 +1,9 @@
-"""Work done in processes of its own: more than one at a time, and none that lives for long.
+"""Jobs run in separate short-lived processes, several at a time.
 
-gstlearn keeps some kilobytes of every system that it has solved (measured with 1.11.1), so that
-millions of targets would fill the memory of one process; a process is left after so many. They
-are started from this module and not from the calling script, which needs no guard therefore.
+gstlearn does not free some kilobytes of every system that it solves (measured with 1.11.1), so
+millions of targets would fill the memory of one process. Each process therefore ends after one
+job. Processes run this module, not the calling script, so that script needs no
+``if __name__ == "__main__"``.
 """
 
 from __future__ import annotations
@@ -19,21 +20,21 @@ from geounfold.errors import BackendError
 
 
 def apart(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], workers: int) -> list[Any]:
-    """Return what a module's function makes of each job, in their order.
+    """Return a function's result for each job, in the jobs' order.
 
     Parameters
     ----------
     function : callable
-        Found by its module and name in the other process.
+        A function of a module; the other process imports it by its name.
     jobs : sequence of tuple
-        The function's arguments; pickled.
+        Arguments of the function for each job; they are pickled.
     workers : int
-        Processes at a time.
+        Number of processes at a time.
 
     Raises
     ------
     BackendError
-        A process ended without an answer.
+        A process ended with an error.
     """
     running: list[subprocess.Popen[bytes]] = []
 
@@ -49,7 +50,7 @@ def apart(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], workers
         running.append(process)
         answer, words = process.communicate(pickle.dumps((function, arguments)))
         if process.returncode:
-            lines = words.decode(errors="replace").strip().splitlines() or ["no word of why"]
+            lines = words.decode(errors="replace").strip().splitlines() or ["no message"]
             raise BackendError(
                 f"a process that estimates ended with status {process.returncode}: {lines[-1]}"
             )
@@ -66,10 +67,10 @@ def apart(function: Callable[..., Any], jobs: Sequence[tuple[Any, ...]], workers
 
 
 def main() -> None:
-    """Read a function and its arguments from stdin, and write what it returns to stdout."""
+    """Read a function and its arguments from stdin and write its result to stdout."""
     function, arguments = pickle.load(sys.stdin.buffer)
     with os.fdopen(os.dup(1), "wb") as out:
-        os.dup2(2, 1)  # whatever a library says does not mix with the answer
+        os.dup2(2, 1)  # a library's output to stdout goes to stderr, apart from the answer
         pickle.dump(function(*arguments), out)
 
 

@@ -226,10 +226,10 @@ def test_what_has_no_value_is_counted_not_made_up() -> None:
 @pytest.mark.parametrize(
     ("values", "split", "says"),
     [
-        (np.zeros((2, 1)), 4, "one row a source block"),
+        (np.zeros((2, 1)), 4, "one row per source block"),
         (np.zeros(1), 4, "must have shape"),
         (np.full((1, 1), np.inf), 4, "finite"),
-        (np.zeros((1, 1)), 0, "at least 1 part"),
+        (np.zeros((1, 1)), 0, "split must be 1 or more"),
     ],
 )
 def test_transfers_refused(values: Floats, split: int, says: str) -> None:

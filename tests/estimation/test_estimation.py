@@ -390,7 +390,7 @@ def test_exploration_of_both_spaces(drilled) -> None:
                 POINTS, VALUES, TARGETS, model("spherical"),
                 Neighbourhood(radii=(1, 1, 1), max_per_hole=2),
             ),
-            "needs the samples' holes",
+            "needs the hole of each sample",
         ),
         (
             lambda: krige(POINTS, VALUES, TARGETS, model("spherical"), WIDE, workers=0),
@@ -445,7 +445,7 @@ def test_samples_without_what_is_needed(drilled) -> None:
         estimate(u, samples.assign(x=1e7), grade="grade")
     with pytest.raises(InputError, match="a map holds no blocks"):
         estimate(u.map, samples, grade="grade")
-    with pytest.raises(OptionError, match="has no 'max'"):
+    with pytest.raises(OptionError, match="has no parameter 'max'"):
         estimate(u, samples, grade="grade", neighbourhood={"max": 3})
     nameless = estimate(u, samples.drop(columns="hole"), u.folded[:9], grade="grade")
     with pytest.raises(InputError, match="whole holes"):

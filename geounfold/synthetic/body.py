@@ -1,4 +1,4 @@
-"""Simulated folded bodies: what one is made of, and its geometry, exact both ways."""
+"""Simulated folded bodies: their blocks, and the exact map between folded and unfolded."""
 
 from __future__ import annotations
 
@@ -21,14 +21,20 @@ from geounfold.synthetic.profile import FlexuralSlip, require_positive
 class Sheet:
     """The geometry of a simulated body: the exact map between its truth and the world.
 
-    Truth coordinates are (u, v, w): across the fold axis, along it, and up the layer's normal;
-    local ones (x, y, z) are folded, before the fold is turned and moved into the world.
+    Truth coordinates (u, v, w) run across the fold axis, along it, and up the layer's normal.
+    Local coordinates (x, y, z) are those of the folded sheet, before it is turned and moved into
+    the world.
+
+    Parameters
+    ----------
+    spec : FoldSpec
+        The body's recipe.
 
     Raises
     ------
     OptionError
-        When made: a hinge tighter than the sheet is thick, limbs that overlap, or a closed
-        sheet whose ends do not meet.
+        A hinge's radius is within the half-thickness, limbs overlap, or the ends of a closed sheet
+        do not meet.
     """
 
     spec: FoldSpec
@@ -86,7 +92,7 @@ class Sheet:
         """Return which points (n, 3) in truth coordinates lie in the body."""
         u, v, w = truth.T
         low, high = self.heights(u, v)
-        # A closed sheet ends at normals: the part of the length whose normal a point stands on.
+        # A closed sheet ends at normals, so a point belongs to the arc length of its own normal.
         along = self.slip.arc_length(u, w) if self.spec.closed else u
         out: Bools = keeps(self.spec, along, v, w) & (w >= low) & (w <= high)
         return out
@@ -102,7 +108,7 @@ class Sheet:
     def unfold(self, points: Floats) -> tuple[Floats, Bools]:
         """Return truth coordinates (n, 3) of world points, and which points have them.
 
-        A point out of the sheet's reach is marked False and its row holds zeros.
+        A point outside the sheet's reach has False and a row of zeros.
         """
         offset = np.asarray(self.spec.offset, float)
         return self.unfold_local((points - offset) @ self.axes.T)
@@ -138,7 +144,7 @@ class Sheet:
 
     def boundary(self, n: int = 200, m: int = 9) -> Floats:
         """Return truth coordinates (2 n m, 3) of bottom and top over the whole sheet."""
-        # The ends of a closed sheet are one place: stay half a step away from it.
+        # The ends of a closed sheet coincide: stay half a step away from them.
         short = self.spec.length / (2 * n) if self.spec.closed else 0.0
         u, v = np.meshgrid(
             np.linspace(short, self.spec.length - short, n),
@@ -150,7 +156,10 @@ class Sheet:
         return np.concatenate(sides)
 
     def over(self, along: Floats, v: Floats, w: Floats) -> Floats:
-        """Return truth coordinates (n, 3) over places on the sheet: u, or s of a closed one."""
+        """Return truth coordinates (n, 3) at heights w over positions on the sheet.
+
+        ``along`` is u, or the arc length s on a closed sheet.
+        """
         u = self.slip.slipped(along, w) if self.spec.closed else along
         return np.stack([u, v, w], axis=1)
 
@@ -166,7 +175,7 @@ class Sheet:
             )
 
     def _check_hinges(self, slip: FlexuralSlip, shape: Thickness) -> None:
-        """Raise OptionError where the sheet reaches a centre of curvature."""
+        """Raise OptionError if the sheet reaches a centre of curvature."""
         s = slip.knots[:: max(1, len(slip.knots) // 4000), None]
         t = slip.reach * np.linspace(-1, 1, 17)
         curvature = slip.profile.curvature(s)
@@ -186,7 +195,7 @@ class Sheet:
                 )
 
     def _check_overlap(self) -> None:
-        """Raise OptionError where the folded sheet covers itself."""
+        """Raise OptionError if the folded sheet covers itself."""
         truth = self.boundary()
         back, found = self.unfold_local(self.fold_local(truth))
         off = np.abs(back - truth).max(axis=1) > 1e-6 * self.spec.length
@@ -205,15 +214,17 @@ class Body:
     Attributes
     ----------
     name : str
+        Name of the case, or family of a random body.
     folded : (n, 3) float
-        Block centroids as a block model would give them, world coordinates.
+        Block centroids as in a block model, world coordinates.
     truth : (n, 3) float
         The same blocks before folding: u across the fold axis, v along it, w height above the
-        mid surface.  The frame is right-handed and w grows towards the top: never mirrored.
+        mid surface. The frame is right-handed and w grows towards the top, so it is never a
+        mirror image.
     bottom, top : (n,) float
         Heights w of the body's surfaces below and above each block.
     steps : (3,) float
-        Block sides along the lattice's axes; of a sub-blocked body, the parents'.
+        Block sides along the lattice's axes; those of the parents in a sub-blocked body.
     sizes : (n, 3) float
         Each block's own sides along the lattice's axes.
     sheet : Sheet
@@ -235,7 +246,7 @@ class Body:
 
     @property
     def description(self) -> str:
-        """One line that says what the body is."""
+        """Description of the body in one line."""
         return self.sheet.spec.description
 
     @property
@@ -250,9 +261,14 @@ class Body:
         return out
 
     def frame(self, decimals: int | None = None) -> pd.DataFrame:
-        """Return a table: centroid_x/y/z, true_x/y/z; a row per block, rounded on request.
+        """Return a table with a row per block and columns centroid_x/y/z and true_x/y/z.
 
-        Where blocks differ in size, dim_x/y/z are their sides along the lattice's axes.
+        If blocks differ in size, columns dim_x/y/z hold their sides along the lattice's axes.
+
+        Parameters
+        ----------
+        decimals : int, optional
+            Decimals to which all columns are rounded; not rounded by default.
         """
         data = {f"centroid_{c}": self.folded[:, i] for i, c in enumerate("xyz")}
         data.update({f"true_{c}": self.truth[:, i] for i, c in enumerate("xyz")})
@@ -267,9 +283,14 @@ class Body:
         Parameters
         ----------
         side : {'top', 'bottom'}
+            The surface to return. Its normals point up the sheet.
         spacing : float
-            Edge length before folding.  Triangles that leave the outline are dropped; normals
-            point up the sheet.
+            Edge length before folding. Triangles that leave the outline are dropped.
+
+        Raises
+        ------
+        OptionError
+            A value outside its valid ones.
         """
         if side not in ("top", "bottom"):
             raise OptionError(f"side {side!r} is not one of: top, bottom")

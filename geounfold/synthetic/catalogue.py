@@ -30,8 +30,8 @@ _OPEN = Profile(elements=(Sinusoid(amplitude=48, wavelength=640),))
 _LIMB70 = Profile(elements=(Sinusoid(amplitude=70, wavelength=880),))
 
 _CASES = {
-    # The two bodies of the thesis's point counts.  Origin and pin are those of the files that
-    # first carried these names: a profile tabulated every 45 mm from s = -150 to 750.
+    # Two bodies with the thesis's point counts. Origin and pin are those of the first files of
+    # these names, whose profile was tabulated every 45 mm from s = -150 to 750.
     "sim_case_1": FoldSpec(
         description="one open anticline, 60 x 60 x 6 blocks gridded before folding",
         profile=Profile(elements=(Sinusoid(amplitude=30, wavelength=1200, phase=90),)),
@@ -403,7 +403,7 @@ _CASES = {
 }
 
 CASES: Mapping[str, FoldSpec] = MappingProxyType(_CASES)
-"""The named bodies: read-only, name -> FoldSpec."""
+"""Recipes of the named bodies, by name; read-only."""
 
 
 def simulate(case: str | FoldSpec, *, blocks: int | None = None, **overrides: object) -> Body:
@@ -412,22 +412,22 @@ def simulate(case: str | FoldSpec, *, blocks: int | None = None, **overrides: ob
     Parameters
     ----------
     case : str or FoldSpec
-        A name in CASES, or a recipe of one's own.
+        A name in CASES, or a recipe.
     blocks : int, optional
-        Grow or shrink the body in its plane to about so many blocks (FoldSpec.with_blocks).
+        Number of blocks; the body is enlarged or reduced in its plane to hold about as many.
     **overrides
-        Other values of any FoldSpec field: ``noise=0.1``, ``steps=(5, 5, 2.5)``, …
+        Other values of FoldSpec fields, such as ``noise=0.1`` or ``steps=(5, 5, 2.5)``.
 
     Returns
     -------
     Body
-        Same input, same body, bit for bit.
+        Equal input gives equal bodies, bit for bit.
 
     Raises
     ------
     OptionError
-        Unknown names (the message lists the valid ones), values outside their range, a body
-        that is geometrically impossible, or one that holds no block.
+        A name is unknown (the message lists the valid ones), a value is outside its range, or the
+        body is geometrically impossible or holds no block.
 
     Examples
     --------

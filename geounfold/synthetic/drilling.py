@@ -24,7 +24,7 @@ _ABOVE = 20.0  # collars above the body, in its blocks' longest sides
 
 @dataclass(frozen=True, eq=False)
 class DrilledTables:
-    """Three tables as `geounfold.read_drillholes` takes them; it unpacks as them.
+    """Three tables as `geounfold.read_drillholes` takes them; unpacks as collar, survey, assay.
 
     Attributes
     ----------
@@ -61,27 +61,33 @@ def drill(
     Parameters
     ----------
     body : Body
+        The body to drill.
     field : GradeField
+        Its grades.
     spacing : float
-        Between collars, on a square grid; of fans, between their collars.
+        Distance between collars on a square grid, in the body's unit; between the collars of fans
+        it is twice that.
     pattern : {"vertical", "inclined", "fanned"}
-        Fans have five holes in the vertical plane of the bearing, up to 30 degrees off the
-        vertical, from collars twice the spacing apart.
+        Direction of the holes. A fan has five holes from one collar, in the vertical plane of the
+        bearing, up to 30 degrees off the vertical.
     interval : float
-        Length of the assayed intervals; each has the grade at its midpoint.
-    bearing, dip : float
-        Of inclined holes, degrees: clockwise from +y, and below the horizontal.
+        Length of the assayed intervals, in the body's unit; each has the grade at its midpoint.
+    bearing : float
+        Direction of inclined holes and of fans, degrees clockwise from +y.
+    dip : float
+        Inclination of inclined holes, degrees below the horizontal, 10 to 90.
     seed : int
-        The grid's offset and the collars' scatter (a tenth of the spacing).
+        Seed of the grid's offset and of the collars' scatter (a tenth of the spacing).
 
     Returns
     -------
     DrilledTables
+        The holes that hit the body.
 
     Raises
     ------
     OptionError
-        A value outside its valid ones, or holes that all miss the body.
+        A value is outside its valid ones, or all holes miss the body.
     """
     require_positive("spacing", spacing)
     require_positive("interval", interval)

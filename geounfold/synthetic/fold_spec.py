@@ -1,4 +1,4 @@
-"""What a simulated body is made of."""
+"""The recipe of a simulated body."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GRIDS = ("before", "after", "scattered")
 
 @dataclass(frozen=True, kw_only=True)
 class FoldSpec:
-    """A recipe of a simulated body.  Lengths are in one unit of the user's, say metres.
+    """The recipe of a simulated body. All lengths are in one unit, which the user chooses.
 
     Parameters
     ----------
@@ -31,42 +31,44 @@ class FoldSpec:
     outline : tuple of regions
         Ellipse, Hole, Ragged, Embayment, ObliqueCut, Neck, Gap; the body lies in all of them.
     steps : (float, float, float)
-        Block sides along the lattice's axes; of scattered points, one for each such block's volume.
+        Block sides along the lattice's axes; there is one scattered point per volume of a block.
     grid : {'before', 'after', 'scattered'}
-        Blocks are regular before folding, or after it (as a block model's are), or points are
+        Blocks are regular before folding, or after it (as in a block model), or points are
         scattered at random without a lattice.
     azimuth, plunge, tilt : float
-        Of the fold axis, as bearing, plunge and dip of ``rotation_from_angles``; degrees.
+        Angles of the fold axis, degrees: bearing, plunge and dip of ``rotation_from_angles``.
     lattice_bearing, lattice_plunge, lattice_dip : float
-        Of the lattice of a body gridded after folding, as in ``rotation_from_angles``; degrees.
+        Angles of the lattice of a body gridded after folding, degrees, as those of the fold axis.
     offset : (float, float, float)
         World coordinates of the fold's and the lattice's origin.
     noise : float
-        Standard deviation added to each folded coordinate, in block sides; the truth has none.
+        Standard deviation of the noise of each folded coordinate, in block sides; the truth has
+        none.
     missing : float
-        Share of the blocks left out at random.
+        Share of the blocks left out at random, in [0, 1).
     seed : int
-        Of noise and missing blocks.
+        Seed of noise, missing blocks and scattered points.
     pin : float or None
         Heading, degrees, at which layers do not slip; None for the mean heading.
     origin : float
         Arc length whose mid-surface point is the origin.
     refold : Profile or None
-        A second fold, about the axis across the first one.  No exact flattening exists then;
-        the truth keeps volume, not lengths.
+        A second fold, about the axis across the first one. With it no exact flattening exists;
+        the truth keeps volumes, not lengths.
     sub_blocks : {1, 2, 4, 8}
-        Blocks that the body's surface crosses are halved along every axis, and halved again
-        until so many stand on a side: ``steps`` are those of the parent blocks then.
+        Number of smallest blocks along a parent's side. Blocks that the body's surface crosses are
+        halved along every axis down to that number; ``steps`` are the parents' sides.
     density : float
-        Of scattered points: the highest over the lowest, from 1 up.
+        Highest over lowest density of scattered points, 1 or more.
     closed : bool
-        The profile ends where it starts, as a tube's does, and the body is whole there.  No flat
-        image exists without a cut; the truth is that of the tube cut along the normals there.
+        Whether the profile ends where it starts, as a tube's does, and the body is whole there.
+        A closed body has no flat image without a cut; the truth is that of the tube cut along the
+        normals there.
 
     Raises
     ------
     OptionError
-        A value outside its valid ones.
+        A value is outside its valid ones.
     """
 
     description: str
@@ -156,12 +158,18 @@ class FoldSpec:
 
     @property
     def developable(self) -> bool:
-        """Whether an exact flattening exists: unless folded twice, or closed."""
+        """Whether an exact flattening exists: not if the body is folded twice, or closed."""
         twice = self.refold is not None and self.refold.elements and self.profile.elements
         return not (twice or self.closed)
 
     def with_options(self, **overrides: object) -> FoldSpec:
-        """Return a copy with other values of some fields, or OptionError naming the valid ones."""
+        """Return a copy with other values of some fields.
+
+        Raises
+        ------
+        OptionError
+            A name is no field, or a value is outside its valid ones.
+        """
         names = [f.name for f in fields(self)]
         for name in overrides:
             if name not in names:
@@ -172,10 +180,16 @@ class FoldSpec:
         return replace(self, **overrides)  # type: ignore[arg-type]
 
     def with_blocks(self, blocks: int) -> FoldSpec:
-        """Return the body grown or shrunk in its plane to hold about so many blocks.
+        """Return the body enlarged or reduced in its plane to hold about so many blocks.
 
-        Length and width are scaled; sinusoids go on, bends and bumps are stretched.  Of a
-        sub-blocked body the parents are counted, those at the surface by their part of a block.
+        Length and width are scaled. Sinusoids keep their wavelength; bends and bumps are
+        stretched. In a sub-blocked body the parents are counted, and those at the surface count by
+        the share of them in the body.
+
+        Parameters
+        ----------
+        blocks : int
+            Number of blocks wanted.
         """
         require_positive("blocks", blocks)
         spec = self

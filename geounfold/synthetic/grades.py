@@ -1,8 +1,8 @@
-"""Grades whose truth is known everywhere: random fields in the unfolded space of a body.
+"""Grades that are known everywhere: random fields in the unfolded space of a body.
 
-A field is a sum of many waves with random directions, lengths and phases, drawn so that its
-covariance is the one asked for (the spectral method: Shinozuka 1971; Chiles and Delfiner 2012,
-section 7.5.4). It has a value at any point, so samples, blocks and checks never need a grid.
+A field is a sum of many waves with random directions, lengths and phases, drawn so that it has a
+given covariance (the spectral method: Shinozuka 1971; Chiles and Delfiner 2012, section 7.5.4).
+It has a value at every point, so samples, blocks and checks need no grid.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from geounfold.geometry.mesh import Floats
 from geounfold.synthetic.profile import require_finite, require_positive
 
 FIELD_KINDS = ("spherical", "exponential", "gaussian")
-"""Covariances: the first two rough, the last smooth."""
+"""Covariance models; fields of the first two are rough, those of the last smooth."""
 
 _SCALE = np.log(20.0)  # 5 % of the covariance is left at the range
 _ROWS = 4096  # points evaluated at a time
-_TABLE = 200_000  # entries of the spherical model's spectrum, up to wave number 2 pi times so many
-_CYCLES = 2000.0
+_TABLE = 200_000  # entries in the table of the spherical model's spectrum
+_CYCLES = 2000.0  # largest wave number in that table, in cycles per range
 
 
 @dataclass(frozen=True)
@@ -32,25 +32,26 @@ class GradeField:
     Parameters
     ----------
     kind : {"spherical", "exponential", "gaussian"}
-        Covariance of the gaussian field behind the grades.
+        Covariance of the gaussian field from which the grades are made.
     ranges : (float, float, float)
-        Along u, v and w: where 5 % of the covariance is left, of the spherical one none.
+        Distances along u, v and w at which 5 % of the covariance is left (spherical: none).
     seed : int
-        The same seed, the same field.
+        Seed of the waves; equal seeds give equal fields.
     mean : float
-        Of the grades.
+        Mean of the grades, without layers.
     deviation : float
-        Standard deviation of the grades, layers aside.
+        Standard deviation of the grades, without layers.
     lognormal : bool
-        Grades are lognormal, with this mean and deviation; else gaussian.
+        Whether grades are lognormal, with this mean and deviation, instead of gaussian.
     layers : tuple of float
-        What is added to the grade in layers of equal stratigraphic height, from the bottom up.
+        Values added to the grades in layers of equal stratigraphic height, from the bottom up.
     waves : int
+        Number of waves in the sum.
 
     Raises
     ------
     OptionError
-        A value outside its valid ones.
+        A value is outside its valid ones.
     """
 
     kind: str
@@ -88,12 +89,12 @@ class GradeField:
         truth : (n, 3) float
             Truth coordinates of a body (`Body.truth`, `Sheet.unfold`).
         stratigraphic : (n,) float, optional
-            0 at the bottom, 1 at the top; needed where there are layers.
+            0 at the bottom, 1 at the top; needed if there are layers.
 
         Raises
         ------
         OptionError
-            Layers without stratigraphic coordinates.
+            There are layers, but no stratigraphic coordinates.
         """
         z = self.standard(truth)
         if self.lognormal:
@@ -109,7 +110,7 @@ class GradeField:
         return np.asarray(grade + np.asarray(self.layers)[np.clip(layer, 0, len(self.layers) - 1)])
 
     def standard(self, truth: Floats) -> Floats:
-        """Return the gaussian field behind the grades, (n,): mean 0, variance 1."""
+        """Return the gaussian field of the grades, (n,), with mean 0 and variance 1."""
         frequency, phase = self._spectrum
         place = np.asarray(truth, dtype=np.float64) / self.ranges
         out = np.empty(len(place))
@@ -135,7 +136,7 @@ class GradeField:
 
 
 def _ball_spectrum() -> tuple[Floats, Floats]:
-    """Return the distribution of the spherical model's wave numbers: share below, and wave number.
+    """Return the cumulative distribution of the spherical model's wave numbers: share, number.
 
     The model is the overlap of two balls of diameter 1, so its spectrum is the square of a ball's
     transform, (sin x - x cos x)^2 / x^6 with x half the wave number.

@@ -1,8 +1,8 @@
-"""The shape of a sheet before folding: its thickness, its rim, its holes.
+"""The shape of a sheet before folding: thickness, edge and holes.
 
 Coordinates are those before folding: u in [0, length], v in [0, width], w the height above the
-mid surface.  Shapes are given as shares of length and width where they should grow with the
-sheet, in length units where they belong to the blocks.
+mid surface. Shapes that grow with the sheet are given as shares of its length and width; shapes
+that depend on the blocks are given in length units.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Even:
 
 @dataclass(frozen=True)
 class Lens:
-    """A lens: ``thickness * (1 - r^2)``, r the distance from the middle, 1 on the ellipse."""
+    """A lens: ``thickness * (1 - r^2)``, with r = 0 in the middle and 1 on the ellipse."""
 
     thickness: float
 
@@ -90,9 +90,9 @@ class Swell:
     thickness : float
         Mean thickness.
     amplitude : float
-        Share of it, below 1.
+        Largest change, as a share of the thickness, below 1.
     cycles : (float, float)
-        Periods p along the length, q along the width.
+        Number of periods p along the length, q along the width.
     """
 
     thickness: float
@@ -142,11 +142,16 @@ class Bulge:
 
     Parameters
     ----------
-    thickness, height : float
-        Even thickness, and the bulge's height above it.
-    at, size : (float, float)
-        The bulge's middle and standard deviations, shares of length and width.
+    thickness : float
+        Thickness of the even sheet.
+    height : float
+        Height of the bulge above it.
+    at : (float, float)
+        Middle of the bulge, shares of length and width.
+    size : (float, float)
+        Standard deviations of the bulge, shares of length and width.
     side : {'top', 'bottom'}
+        Surface that has the bulge.
     """
 
     thickness: float
@@ -218,8 +223,10 @@ class Hole:
 
     Parameters
     ----------
-    at, size : (float, float)
-        Its middle and half-axes, shares of length and width.
+    at : (float, float)
+        Middle of the hole, shares of length and width.
+    size : (float, float)
+        Half-axes of the hole, shares of length and width.
     """
 
     at: tuple[float, float] = (0.5, 0.5)
@@ -239,13 +246,16 @@ class Hole:
 
 @dataclass(frozen=True)
 class Ragged:
-    """Draw every side of the rim in by a smooth random depth between 0 and ``depth``.
+    """Move every side of the edge inwards by a smooth random depth between 0 and ``depth``.
 
     Parameters
     ----------
-    depth, scale : float
-        Largest depth, and length along the rim over which it varies, in length units.
+    depth : float
+        Largest depth, in length units.
+    scale : float
+        Length along the edge over which the depth varies, in length units.
     seed : int
+        Seed of the depths.
     """
 
     depth: float
@@ -273,16 +283,16 @@ class Ragged:
 
 @dataclass(frozen=True)
 class Embayment:
-    """Leave out a half-ellipse bitten from one side of the rim.
+    """Leave out a half-ellipse at one side of the edge.
 
     Parameters
     ----------
     side : {'u0', 'u1', 'v0', 'v1'}
         The side at u = 0, u = length, v = 0 or v = width.
     at, size : float
-        Middle and half-length of the bite along the side, shares of the side.
+        Middle and half-length of the embayment along the side, shares of the side.
     depth : float
-        Depth of the bite, a share of the sheet's extent across the side.
+        Depth of the embayment, a share of the sheet's extent across the side.
     """
 
     side: str = "v0"
@@ -306,13 +316,15 @@ class Embayment:
 
 @dataclass(frozen=True)
 class ObliqueCut:
-    """Cut one side of the rim along a plane that leans from the layers' normal.
+    """Cut one side of the edge along a plane that leans from the layers' normal.
 
     Parameters
     ----------
-    side : {'u0', 'u1', 'v0', 'v1'}
     angle : float
-        Degrees between the cut and the normal, in (-90, 90); positive takes from the top.
+        Angle between the cut and the normal, degrees, in (-90, 90); a positive one shortens the
+        top.
+    side : {'u0', 'u1', 'v0', 'v1'}
+        The side at u = 0, u = length, v = 0 or v = width.
     setback : float
         Distance from the side at which the cut crosses the mid surface, in length units.
     """
@@ -336,14 +348,14 @@ class ObliqueCut:
 
 @dataclass(frozen=True)
 class Neck:
-    """Two islands joined by a neck: the middle of the length is narrowed.
+    """Narrow the middle of the length, so that a neck joins two wide parts.
 
     Parameters
     ----------
     extent : float
-        Share of the length that is neck.
+        Length of the neck, as a share of the sheet's.
     breadth : float
-        The neck's width, in length units.
+        Width of the neck, in length units.
     """
 
     extent: float
@@ -367,8 +379,9 @@ class Gap:
     Parameters
     ----------
     axis : {'u', 'v', 'w'}
+        Coordinate across the slab.
     low, high : float
-        In length units, before folding.
+        Limits of the slab, in length units, before folding.
     """
 
     axis: str

@@ -1,15 +1,15 @@
 """Fold profiles given by their heading along arc length, and flexural slip on them.
 
-The mid surface of a cylindrical fold is a plane curve ``P(s)``, s its arc length, whose tangent
-is ``T = (cos theta, sin theta)`` and whose normal is ``N = (-sin theta, cos theta)``.  A point at
+In cross-section the mid surface of a cylindrical fold is a plane curve ``P(s)`` of arc length s,
+with tangent ``T = (cos theta, sin theta)`` and normal ``N = (-sin theta, cos theta)``. A point at
 signed normal offset t lies at ``P(s) + t N(s)``; the layer at that offset is ``1 - t theta'`` times
-as long as the mid surface.  Flexural slip keeps the length of every layer and the thickness, so
-before folding the point lay at
+as long as the mid surface. Flexural slip keeps the length of every layer and the thickness, so
+before folding the point was at
 
     u = s - t (theta(s) - pin),    w = t,
 
-pin being the heading at which layers do not slip (the geologist's pin line).  The area element
-is ``(1 - t theta') ds dt = du dw`` on both sides: the map preserves volume exactly.
+with pin the heading at which layers do not slip (the pin line). The area element is
+``(1 - t theta') ds dt = du dw`` on both sides, so the map preserves volume exactly.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Element(Protocol):
         """Return the heading, radians, at arc lengths s (n,)."""
 
     def curvature(self, s: Floats) -> Floats:
-        """Return its derivative along arc length, (n,), radians per length unit."""
+        """Return the heading's derivative along arc length, (n,), radians per length unit."""
 
     def swing(self) -> float:
         """Return a bound on the size of the heading, radians."""
@@ -80,7 +80,7 @@ class Sinusoid:
     wavelength : float
         Arc length of one anticline and one syncline together.
     phase : float
-        Degrees; 90 starts at the steepest upward limb.
+        Phase at s = 0, degrees; with 90 the profile starts at the steepest upward limb.
     """
 
     amplitude: float
@@ -120,7 +120,7 @@ class Sinusoid:
         return self.wavelength / 4
 
     def stretched(self, factor: float) -> Sinusoid:
-        """Return the element itself: on a longer sheet the train of folds goes on."""
+        """Return the element itself: a longer sheet has more folds."""
         return self
 
 
@@ -137,7 +137,8 @@ class Bend:
     radius : float
         Smallest radius of curvature of the mid surface in the hinge.
     shape : {'smooth', 'arc'}
-        'arc' bends along a circular arc; 'smooth' along a quintic smoothstep, 15/8 as long.
+        Change of heading along the hinge: linear (a circular arc), or a quintic smoothstep, for
+        which the hinge is 15/8 as long.
     """
 
     at: float
@@ -182,7 +183,7 @@ class Bend:
         return float(np.abs(np.radians(self.change)))
 
     def breaks(self) -> tuple[float, ...]:
-        """Return where the hinge begins and ends."""
+        """Return the arc lengths at which the hinge begins and ends."""
         return (self.at - self.extent / 2, self.at + self.extent / 2)
 
     def scale(self) -> float:
@@ -196,14 +197,16 @@ class Bend:
 
 @dataclass(frozen=True, kw_only=True)
 class Bump:
-    """A passing change of heading, ``amplitude * exp(-((s - at) / width)^2 / 2)``.
+    """A change of heading that fades out, ``amplitude * exp(-((s - at) / width)^2 / 2)``.
 
     Parameters
     ----------
-    at, width : float
-        Arc length of its middle and its standard deviation.
+    at : float
+        Arc length of the bump's middle.
     amplitude : float
         Largest change of heading, degrees.
+    width : float
+        Standard deviation along arc length.
     """
 
     at: float
@@ -249,9 +252,9 @@ class Profile:
     Parameters
     ----------
     elements : tuple of Sinusoid, Bend or Bump
-        Terms whose headings add up; none for a plane.
+        Terms of which the headings are added; none for a plane.
     start : float
-        Constant heading, degrees: 0 horizontal, 90 straight up.
+        Constant heading, degrees; 0 is horizontal, 90 is straight up.
 
     Examples
     --------
@@ -274,7 +277,7 @@ class Profile:
         return out
 
     def curvature(self, s: Floats) -> Floats:
-        """Return the heading's derivative, (n,); positive where the curve turns upwards."""
+        """Return the heading's derivative along arc length, (n,); positive if it turns upwards."""
         out = np.zeros(np.shape(s))
         for element in self.elements:
             out += element.curvature(s)
@@ -304,9 +307,10 @@ class FlexuralSlip:
     pin : float or None
         Heading, radians, at which layers do not slip; None for the mean over the length.
     origin : float
-        Arc length whose point is x = z = 0.
+        Arc length of the point x = z = 0.
     closed : bool
-        The mid curve ends where it starts: points have their feet in ``[0, length]``.
+        Whether the mid curve ends where it starts. The feet of all points are then in
+        ``[0, length]``.
     """
 
     profile: Profile
@@ -318,7 +322,7 @@ class FlexuralSlip:
 
     @cached_property
     def still(self) -> float:
-        """Heading without slip, radians: ``pin``, or the mean heading over the length."""
+        """Heading at which layers do not slip, radians: ``pin``, or the mean over the length."""
         if self.pin is not None:
             return self.pin
         knots = self._cut(0.0, self.length)
@@ -334,7 +338,7 @@ class FlexuralSlip:
 
     @cached_property
     def _anchors(self) -> Floats:
-        """Return the mid curve's points at the knots, (k, 2)."""
+        """The mid curve's points at the knots, (k, 2)."""
         steps = self._advance(self.knots[:-1], np.diff(self.knots))
         anchors = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         k = min(int(np.searchsorted(self.knots, self.origin, "right")) - 1, len(steps) - 1)
@@ -344,7 +348,7 @@ class FlexuralSlip:
 
     @cached_property
     def _feet(self) -> tuple[cKDTree, Floats]:
-        """Return a tree of mid-curve samples that the sheet covers, and their arc lengths."""
+        """A tree of samples of the mid curve that the sheet covers, and their arc lengths."""
         if self.closed:
             s = self._cut(0.0, self.length)
             return cKDTree(self.points(s)), s
@@ -382,9 +386,9 @@ class FlexuralSlip:
         return out
 
     def arc_length(self, u: Floats, w: Floats) -> Floats:
-        """Return s (n,) with ``s - w (theta(s) - still) = u``: where a point's normal stands.
+        """Return the arc lengths s (n,) of points' normals: ``s - w (theta(s) - still) = u``.
 
-        The left side rises with s wherever ``1 - w theta' > 0``, so s is unique.
+        The left side grows with s if ``1 - w theta' > 0``, so s is unique.
         """
 
         def residual(s: Floats, rows: Ints) -> tuple[Floats, Floats]:
@@ -409,10 +413,10 @@ class FlexuralSlip:
         return out
 
     def unfold(self, xz: Floats) -> tuple[Floats, Bools]:
-        """Return (u, w), (n, 2), of folded points (x, z), and which points the sheet reaches.
+        """Return (u, w), (n, 2), of folded points (x, z), and whether the sheet reaches them, (n,).
 
-        A point out of reach (farther from the mid curve than ``reach``, beyond its ends or
-        past its centres of curvature) has no truth; its row holds zeros and is marked False.
+        A point out of reach has no truth; it gets False and a row of zeros. Such a point is farther
+        from the mid curve than ``reach``, beyond its ends or beyond its centres of curvature.
         """
         tree, samples = self._feet
         limit = float(np.hypot(self.reach, np.diff(samples).max()) * (1 + 1e-9))
@@ -449,16 +453,18 @@ class FlexuralSlip:
 def bracketed_newton(
     residual: Residual, low: Floats, high: Floats, guess: Floats, tol: float, max_iter: int = 80
 ) -> Floats:
-    """Return roots (n,) of rising functions by Newton's method, kept inside brackets.
+    """Return roots (n,) of increasing functions by Newton's method, kept inside brackets.
 
     Parameters
     ----------
     residual : callable
-        Takes trial values and the rows they belong to; returns values and slopes.
+        Function of trial values and their rows that returns values and slopes.
     low, high, guess : (n,) float
-        Brackets and first trials.  A step that leaves its bracket becomes a bisection.
+        Brackets and first trials. A step that leaves its bracket becomes a bisection.
     tol : float
-        Steps below this size end a row's search.
+        Size of a step below which a row's search ends.
+    max_iter : int
+        Largest number of steps.
     """
     low, high, x = low.copy(), high.copy(), np.clip(guess, low, high)
     rows = np.arange(len(x))

@@ -1,4 +1,4 @@
-"""Random bodies of every kind that can be simulated, each from one seed."""
+"""Random simulated bodies of all families, each from one seed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,9 @@ from geounfold.synthetic.body import Body, Sheet
 from geounfold.synthetic.random_families import BLOCKS, BREADTH, FAMILIES, RECIPES, common_draws
 from geounfold.synthetic.sampling import sample
 
-_DRAWS = 200  # of one seed; the family that needs most (hairpin) takes 5 in the mean
-
-
-_APART = 1.75  # longest block sides between limbs: above the diagonal of a cube of blocks
-
-
-_NEAR = 6.0  # block sides along the sheet, within which places are near by rights
+_DRAWS = 200  # draws from one seed; the family that needs most (hairpin) takes 5 in the mean
+_APART = 1.75  # least gap between limbs, in longest block sides; a cube's diagonal is 1.73
+_NEAR = 6.0  # block sides along the sheet within which points belong to one limb
 
 
 def random_family(seed: int) -> str:
@@ -25,24 +21,24 @@ def random_family(seed: int) -> str:
 
 
 def random_body(seed: int, family: str | None = None) -> Body:
-    """Return a random body: its name is its family, its description what was drawn.
+    """Return a random body, named after its family and described by the values drawn.
 
-    Profile, thickness, outline, block sides, orientation of fold and lattice, place in the
-    world, noise and lost blocks are drawn; the family says which of them is out of the common.
-    Drawings that are geometrically impossible, whose limbs come within 1.75 block sides of each
-    other, that are no sheets or that have not BLOCKS blocks are drawn again.
+    Profile, thickness, outline, block sides, orientation of fold and lattice, position in the
+    world, noise and missing blocks are drawn. The family determines which of them is unusual.
+    A body is drawn again if it is geometrically impossible, if its limbs are within 1.75 block
+    sides of each other, if it is no sheet or if its number of blocks is outside BLOCKS.
 
     Parameters
     ----------
     seed : int
-        Same seed, same body, bit for bit.
+        Seed, 0 or more; equal seeds give equal bodies, bit for bit.
     family : str, optional
-        One of FAMILIES; by default drawn, too (random_family).
+        One of FAMILIES; by default the seed's own (random_family).
 
     Raises
     ------
     OptionError
-        An unknown family, or a seed below 0.
+        The family is unknown, or the seed is below 0.
 
     Examples
     --------
@@ -64,7 +60,7 @@ def random_body(seed: int, family: str | None = None) -> Body:
 
 
 def _drawn(rng: np.random.Generator, family: str, seed: int) -> Body | None:
-    """Return a body, or None when what was drawn is no valid one."""
+    """Return the body drawn; None if it is not valid."""
     draft = common_draws(rng)
     RECIPES[family](draft)
     try:
@@ -80,7 +76,7 @@ def _drawn(rng: np.random.Generator, family: str, seed: int) -> Body | None:
 
 
 def _limb_gap(sheet: Sheet) -> float:
-    """Return the least distance between places of the section that are far along the sheet."""
+    """Return the least distance between points of the section that are far along the sheet."""
     spec = sheet.spec
     side = max(spec.steps)
     if spec.closed or spec.refold is not None:

@@ -1,4 +1,4 @@
-"""Families of random bodies, and how each is drawn."""
+"""Families of random bodies, and the draws of each."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ BLOCKS = (2_000, 12_000)
 """Fewest and most blocks of a random body."""
 
 
-BREADTH = 2.5  # least extent of a sheet over its greatest thickness, but of strips
+BREADTH = 2.5  # least extent of a sheet over its greatest thickness; strips are exempt
 
 
 @dataclass
 class _Draft:
-    """A recipe in the making.  ``side`` is that of a cube of one block's volume."""
+    """A recipe under construction. ``side`` is that of a cube with one block's volume."""
 
     rng: np.random.Generator
     side: float
@@ -51,7 +51,7 @@ class _Draft:
     options: dict[str, object] = field(default_factory=dict)
 
     def between(self, low: float, high: float) -> float:
-        """Return a number drawn evenly, to four digits."""
+        """Return a uniformly drawn number, to four digits."""
         return float(f"{self.rng.uniform(low, high):.4g}")
 
     def chance(self, share: float) -> bool:
@@ -88,7 +88,7 @@ class _Draft:
         return replace(spec, description=", ".join([family, *self.traits(spec)]))
 
     def traits(self, spec: FoldSpec) -> Iterator[str]:
-        """Yield what the description says of a recipe besides its family."""
+        """Yield the parts of a recipe's description that follow its family."""
         hinges = [e.radius for e in spec.profile.elements if isinstance(e, Bend)]
         if hinges:
             yield f"hinge radius {min(hinges) / (self.thick / 2):.2f} half-thicknesses"
@@ -109,7 +109,7 @@ class _Draft:
 
 
 def common_draws(rng: np.random.Generator) -> _Draft:
-    """Return a draft of a body with nothing out of the common but by chance."""
+    """Return a draft of a common body; each unusual property is drawn with a small chance."""
     side = float(f"{10 ** rng.uniform(-0.5, 1.7):.3g}")
     blocks = rng.uniform(2_500, 11_000)
     thick = float(f"{side * rng.uniform(4, 8):.4g}")
@@ -133,7 +133,7 @@ def common_draws(rng: np.random.Generator) -> _Draft:
 
 
 def _placed(draft: _Draft) -> None:
-    """Turn the fold and the lattice, and move both into the world."""
+    """Turn the fold and the lattice, each by chance, and move both into the world."""
     options = draft.options
     if draft.chance(0.5):
         options["azimuth"] = draft.between(-180, 180)
@@ -344,7 +344,7 @@ def _one_block(draft: _Draft) -> None:
 
 
 def _sheet_again(draft: _Draft) -> None:
-    """Shape a sheet of another thickness: an even one, as wide as its blocks allow."""
+    """Give a draft with a new thickness an even sheet, as wide as its blocks allow."""
     draft.shape, draft.outline = None, []
     square = float(np.sqrt(draft.blocks * draft.side**3 / draft.thick))
     draft.length = float(f"{square * draft.between(0.9, 1.8):.4g}")
@@ -367,7 +367,7 @@ def _strip(draft: _Draft) -> None:
 
 
 def _along_lattice(draft: _Draft) -> None:
-    """Turn the lattice as the body: long sides lie in the layers."""
+    """Turn the lattice as the body, so that the blocks' long sides lie in the layers."""
     for fold, lattice in (
         ("azimuth", "lattice_bearing"),
         ("plunge", "lattice_plunge"),
@@ -406,7 +406,7 @@ def _rotated_lattice(draft: _Draft) -> None:
 def _sub_blocked(draft: _Draft) -> None:
     halvings = int(draft.rng.integers(1, 4))
     draft.options["sub_blocks"] = 2**halvings
-    # A parent at the surface becomes some 4, 17 or 70 blocks, one within stays whole.
+    # A parent at the surface becomes about 4, 17 or 70 blocks; one inside stays whole.
     draft.ratios = (1.0, 1.0, 1.0)
     parents = (1.6, 2.4, 3.6)[halvings - 1]
     draft.thick *= parents / 1.6
@@ -477,4 +477,4 @@ RECIPES: Mapping[str, Callable[[_Draft], None]] = MappingProxyType(
 
 
 FAMILIES: tuple[str, ...] = tuple(RECIPES)
-"""What random bodies can be, by what is out of the common in them."""
+"""Families of random bodies, named after their unusual property."""

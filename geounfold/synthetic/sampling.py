@@ -16,7 +16,7 @@ _CHUNK = 400_000  # candidates handled at a time: bounds the memory beside the r
 
 
 class _Blocks(NamedTuple):
-    """Some of a body's blocks: folded and true centroids, and sides, (n, 3) each."""
+    """Blocks of a body: folded and true centroids, and sides, (n, 3) each."""
 
     folded: Floats
     truth: Floats
@@ -27,10 +27,17 @@ class _Blocks(NamedTuple):
 
 
 def sample(name: str, spec: FoldSpec) -> Body:
-    """Return a body's blocks.
+    """Return a body made of blocks.
 
-    Those of a lattice come in its order, x slowest and z fastest; sub-blocks in that of their
-    centroids; scattered points in none.
+    Blocks of a lattice are in its order, x slowest and z fastest. Sub-blocks are in the order of
+    their centroids, scattered points in none.
+
+    Parameters
+    ----------
+    name : str
+        The body's name.
+    spec : FoldSpec
+        The body's recipe.
 
     Raises
     ------
@@ -50,7 +57,7 @@ def sample(name: str, spec: FoldSpec) -> Body:
 
 
 def _damage(sheet: Sheet, blocks: _Blocks) -> _Blocks:
-    """Return the blocks after some are lost and the others' centroids disturbed."""
+    """Return the blocks without the missing ones, and with noise added to the centroids."""
     spec = sheet.spec
     rng = np.random.default_rng(spec.seed)
     if spec.missing:
@@ -62,14 +69,14 @@ def _damage(sheet: Sheet, blocks: _Blocks) -> _Blocks:
 
 
 def _same(spec: FoldSpec, folded: Floats, truth: Floats) -> _Blocks:
-    """Return blocks that all have the sides ``steps``."""
+    """Return blocks of equal sides, the recipe's ``steps``."""
     return _Blocks(folded, truth, np.broadcast_to(np.array(spec.steps, float), truth.shape))
 
 
 def _scattered(sheet: Sheet) -> Iterator[_Blocks]:
-    """Yield random points, one for each block's volume, denser in two corners of the sheet.
+    """Yield random points, one per volume of a block, denser in two corners of the sheet.
 
-    Folding keeps volumes, so points scattered before it are as dense afterwards.
+    Folding keeps volumes, so it does not change the density of points.
     """
     spec = sheet.spec
     rng = np.random.default_rng([spec.seed, 1])
@@ -125,9 +132,9 @@ def _after(sheet: Sheet) -> Iterator[_Blocks]:
 
 
 def _sub_blocked(sheet: Sheet) -> Iterator[_Blocks]:
-    """Yield parent blocks that lie in the body whole, and smaller blocks near its surface.
+    """Yield parent blocks that lie wholly in the body, and smaller blocks near its surface.
 
-    A block lies in the body when its middle and those of all smallest blocks in it do.
+    A block lies in the body if its middle and those of all smallest blocks in it do.
     """
     spec = sheet.spec
     steps = np.array(spec.steps, float)
@@ -153,7 +160,7 @@ def _sub_blocked(sheet: Sheet) -> Iterator[_Blocks]:
 
 
 def _grouped(cells: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return the different rows of cells (n, 3), each row's place among them, and their counts."""
+    """Return the distinct rows of cells (n, 3), each row's index among them, and their counts."""
     low = cells.min(axis=0, initial=0)
     shape = tuple((cells.max(axis=0, initial=0) - low + 1).tolist())
     keys, group, count = np.unique(
@@ -188,7 +195,7 @@ _Candidates = Iterator[tuple[Ints, Ints, Ints, Floats]]
 
 
 def _columns(sheet: Sheet, axes: list[Floats], turn: Floats) -> _Candidates:
-    """Yield lattice indices and truths where one lattice axis is the fold axis: 2-D work."""
+    """Yield lattice indices and truths, computed in 2-D because a lattice axis is the fold axis."""
     x, y, z = axes
     xz = x[:, None, None] * turn[0, [0, 2]] + z[:, None] * turn[2, [0, 2]]
     uw, found = sheet.slip.unfold(xz.reshape(-1, 2))

@@ -21,10 +21,10 @@ class AnalyticSurface:
         The curved surface; normals point to the outer (convex) side.
     uv : (n, 2) float
         Flat image of the smooth surface (arc lengths); the mesh's edges agree with it to second
-        order in the spacing.  For the cap, which cannot be flattened, the equidistant image.
+        order in the spacing. For the cap, which cannot be flattened, the equidistant image.
     chord_uv : (n, 2) float or None
-        Flat image of the mesh itself: every edge keeps its length to rounding.  None where the
-        mesh cannot be flattened.
+        Flat image of the mesh itself, in which every edge keeps its length to rounding; None if
+        the mesh cannot be flattened.
     """
 
     mesh: TriMesh
@@ -51,7 +51,17 @@ def _grid(n: int, m: int) -> tuple[Floats, Floats, Ints]:
 def slab(
     length: float = 100.0, width: float = 60.0, n: tuple[int, int] = (33, 17), dip: float = 0.0
 ) -> AnalyticSurface:
-    """Return a plane, ``dip`` degrees from the horizontal: flattening it changes nothing."""
+    """Return a plane, which flattening does not change.
+
+    Parameters
+    ----------
+    length, width : float
+        Sides of the plane; the length is along the dip.
+    n : (int, int)
+        Vertices along length and width.
+    dip : float
+        Angle from the horizontal, degrees.
+    """
     require_positive("length", length)
     require_positive("width", width)
     require_finite("dip", dip)
@@ -68,15 +78,18 @@ def cylinder(
     length: float = 100.0,
     n: tuple[int, int] = (33, 17),
 ) -> AnalyticSurface:
-    """Return part of a cylinder about the y axis, edges along its rulings, crest upwards.
+    """Return part of a cylinder about the y axis, with edges along its rulings and the crest up.
 
     Parameters
     ----------
-    radius, length : float
+    radius : float
+        Radius of the cylinder.
     angle : float
         Opening, degrees, below 360.
+    length : float
+        Length along the axis.
     n : (int, int)
-        Vertices around and along.
+        Vertices around and along the axis.
     """
     require_positive("radius", radius)
     require_positive("length", length)
@@ -111,9 +124,9 @@ def cone(
 
     Notes
     -----
-    Rulings at an angle psi of the axis keep their lengths; the flat angle between two of them
-    that stand phi apart is ``phi sin psi`` on the cone, ``2 asin(sin psi sin(phi / 2))`` on the
-    pyramid of the mesh.
+    Rulings at an angle psi from the axis keep their lengths. Two of them an angle phi apart about
+    the axis have a flat angle of ``phi sin psi`` on the cone, and of
+    ``2 asin(sin psi sin(phi / 2))`` on the pyramid of the mesh.
     """
     require_positive("inner", inner)
     require_positive("outer", outer)
@@ -137,10 +150,19 @@ def cone(
 def spherical_cap(
     radius: float = 100.0, angle: float = 40.0, n: tuple[int, int] = (33, 33)
 ) -> AnalyticSurface:
-    """Return a square patch of a sphere about its top, ``angle`` degrees to the sides' middles.
+    """Return a square patch of a sphere around its top.
 
     It has Gaussian curvature, so no flattening keeps its lengths; uv is the azimuthal
     equidistant image, exact along the lines through the top.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the sphere.
+    angle : float
+        Angle from the top to the middle of a side, degrees, below 127.
+    n : (int, int)
+        Vertices along the sides.
     """
     require_positive("radius", radius)
     require_positive("angle", angle)

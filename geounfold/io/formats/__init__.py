@@ -1,13 +1,12 @@
-"""File formats by ending, one module for each family, loaded when a file asks for it.
+"""File formats by ending, one module for each family, loaded when a file needs it.
 
-A module offers what its format holds, of
+A module has those of these functions that its format allows:
 
-- ``read_points(path) -> Points`` and ``write_points(path, points)``, or where points are rows of a
-  table ``read_frame(path) -> DataFrame`` and ``write_frame(path, frame, meta)``,
+- ``read_points(path) -> Points`` and ``write_points(path, points)``; if points are rows of a table,
+  ``read_frame(path) -> DataFrame`` and ``write_frame(path, frame, meta)``,
 - ``read_surface(path) -> Surface`` and ``write_surface(path, surface)``.
 
-CSV and Parquet tables are not here but in `geounfold.io.tables`, as they keep whatever text they
-hold.
+CSV and Parquet tables, which keep all text, are in `geounfold.io.tables`.
 """
 
 from geounfold.io.formats.registry import (

@@ -1,7 +1,7 @@
 """DXF wireframes through ezdxf (extra ``formats``): 3DFACE entities, polyface and other meshes.
 
-Corners at the same coordinates become one vertex, as 3DFACE has no vertex numbers. The drawing's
-unit is carried. Coordinates come back bit for bit.
+Corners at the same coordinates become one vertex, because 3DFACE has no vertex numbers. The
+drawing's unit is kept. Coordinates are read back bit for bit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def read_surface(path: Path) -> Surface:
     Raises
     ------
     InputError
-        Not a DXF file, or no faces in it.
+        The file is no DXF file, or holds no faces.
     """
     ezdxf = require("ezdxf", "DXF")
     render = require("ezdxf.render", "DXF")
@@ -63,7 +63,13 @@ def read_surface(path: Path) -> Surface:
 
 
 def write_surface(path: Path, surface: Surface) -> None:
-    """Write one 3DFACE for each triangle."""
+    """Write one 3DFACE for each triangle.
+
+    Raises
+    ------
+    OutputError
+        A coordinate is not finite.
+    """
     if not np.isfinite(surface.V).all():
         raise OutputError("DXF files need finite coordinates")
     ezdxf = require("ezdxf", "DXF")

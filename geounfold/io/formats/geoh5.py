@@ -1,12 +1,12 @@
 """geoh5, the open format of Geoscience ANALYST, through geoh5py (extra ``formats``).
 
-One object of a workspace is read: points, else a block model's cells with their sides (dx, dy, dz)
-and places (i, j, k); or a surface. The object's coordinate reference and the workspace's unit are
-carried; a workspace must have a unit, so one written without any says metres, as the library's own
-do. Floats come back bit for bit, whole numbers beyond 32 bits as floats.
+One object of a workspace is read: a set of points; without one, a block model's cells with their
+sides (dx, dy, dz) and indices (i, j, k); or a surface. The object's coordinate reference and the
+workspace's unit are kept. A workspace must have a unit, so it is metres if the data have none, as
+in the library itself. Floats are read back bit for bit, whole numbers beyond 32 bits as floats.
 
-geoh5py asks for NumPy below 2 on Python 3.11, which geounfold does not work with: the extra
-brings it from Python 3.12 on.
+On Python 3.11 geoh5py needs NumPy below 2, with which geounfold does not work. The extra therefore
+installs it from Python 3.12 on.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def read_points(path: Path) -> Points:
     Raises
     ------
     InputError
-        Not a geoh5 file, or not one such object.
+        The file is no geoh5 file, or has no such object or several.
     """
     with _workspace(path) as (workspace, objects):
         points = _one(path, workspace, objects.Points)
@@ -114,7 +114,7 @@ def _workspace(path: Path) -> Iterator[tuple[Any, Any]]:
     library, objects = _library()
     try:
         workspace = library.Workspace(path, mode="r")
-    except Exception as error:  # the library raises whatever its parts do
+    except Exception as error:  # the library raises errors of many classes
         words = " ".join(str(error).split())
         raise InputError(f"{path}: is not a geoh5 file, or is damaged: {words}") from error
     with workspace:
@@ -133,24 +133,24 @@ def _created(path: Path, meta: Meta) -> Iterator[tuple[Any, Any]]:
         ):
             warnings.simplefilter("ignore")
             yield workspace, objects
-    except RuntimeError as error:  # what HDF5 makes of a full disk, among others
+    except RuntimeError as error:  # HDF5 raises it for a full disk, among others
         code = errno.ENOSPC if os.strerror(errno.ENOSPC) in str(error) else errno.EIO
         raise OSError(code, os.strerror(code), str(path)) from error
 
 
 def _one(path: Path, workspace: Any, kind: Any) -> Any:
-    """Return the only object of exactly this kind, or None where there is none."""
+    """Return the only object of exactly this kind; None if there is none."""
     found = [o for o in workspace.objects if type(o) is kind]
     if len(found) > 1:
         raise InputError(
             f"{path}: holds several objects of one kind ({listing(o.name for o in found)}); "
-            "export the one that is meant"
+            "export a single one"
         )
     return found[0] if found else None
 
 
 def _values(parent: Any, location: str, rows: int) -> dict[str, np.ndarray]:
-    """Return an object's data; referenced ones as their words."""
+    """Return an object's data by name; referenced data as their words."""
     columns: dict[str, np.ndarray] = {}
     for child in parent.children:
         association = getattr(getattr(child, "association", None), "name", "")
@@ -168,12 +168,12 @@ def _values(parent: Any, location: str, rows: int) -> dict[str, np.ndarray]:
 
 
 def _cells(model: Any) -> tuple[Floats, Ints]:
-    """Return sides and places of a block model's cells, in the order of its centroids.
+    """Return sides and indices of a block model's cells, in the order of its centroids.
 
-    Along z, cells may be counted downwards: then their steps are negative.
+    Steps along z are negative if the cells are counted downwards.
     """
     widths = [np.abs(np.asarray(getattr(model, f"{a}_cells"), dtype=np.float64)) for a in "uvz"]
-    # As the library lays its centroids out: z runs fastest, then u, then v.
+    # The library's order of centroids: z runs fastest, then u, then v.
     v, u, z = np.unravel_index(
         np.arange(model.n_cells), (len(widths[1]), len(widths[0]), len(widths[2]))
     )

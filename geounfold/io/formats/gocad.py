@@ -1,8 +1,8 @@
 """GOCAD's text files: TSurf (.ts) triangles and VSet (.vs) points with properties.
 
-Coordinates come with z up: a file that says ZPOSITIVE Depth is turned over. The unit of the axes
-and the name of the coordinate system (with projection and datum) are carried. Numbers come back
-bit for bit.
+Coordinates are returned with z up; in a file with ZPOSITIVE Depth, z changes its sign. The unit of
+the axes and the name of the coordinate system (with projection and datum) are kept. Numbers are
+read back bit for bit.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _NO_NAME = {"default", "local", "gocad local", "unknown", ""}
 
 @dataclass
 class _Object:
-    """One object of a file, as its lines are read."""
+    """One object of a file, filled while its lines are read."""
 
     kind: str
     names: list[str] = field(default_factory=list)
@@ -70,7 +70,13 @@ def read_surface(path: Path) -> Surface:
 
 
 def write_points(path: Path, points: Points) -> None:
-    """Write a VSet; texts as codes, named in the header."""
+    """Write a VSet; texts become codes, which the header lists.
+
+    Raises
+    ------
+    OutputError
+        A coordinate is not finite, or a column has more than 100 texts.
+    """
     made = {name: coded(name, values, "GOCAD") for name, values in points.data.items()}
     values = [v for v, _ in made.values()]
     if not np.isfinite(points.xyz).all():
@@ -123,12 +129,12 @@ def _quoted(text: str, *, always: bool = False) -> str:
 
 
 def _words(line: str) -> list[str]:
-    """Return a line's words, of which double quotes may hold several."""
+    """Return a line's words; text in double quotes is one word."""
     return [quoted or bare for quoted, bare in re.findall(r'"([^"]*)"|(\S+)', line)]
 
 
 def _read(path: Path) -> list[_Object]:
-    """Return the objects of a file that have vertices."""
+    """Return those objects of a file that have vertices."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
@@ -163,7 +169,7 @@ def _read(path: Path) -> list[_Object]:
 
 
 def _take(o: _Object, words: list[str], line: str) -> None:
-    """Take one line into its object."""
+    """Add one line to its object."""
     word, rest = words[0], words[1:]
     if word in ("VRTX", "PVRTX"):
         o.number[int(rest[0])] = len(o.xyz)
@@ -199,7 +205,7 @@ def _vertices(o: _Object) -> np.ndarray:
 
 
 def _columns(o: _Object) -> list[str]:
-    """Return property names, vectors' numbered from 0."""
+    """Return property names; those of a vector's parts are numbered from 0."""
     sizes = o.sizes if len(o.sizes) == len(o.names) else [1] * len(o.names)
     return [
         name if size == 1 else f"{name}_{j}"
@@ -209,7 +215,7 @@ def _columns(o: _Object) -> list[str]:
 
 
 def _properties(o: _Object, path: Path) -> dict[str, np.ndarray]:
-    """Return an object's properties, NaN where they are missing."""
+    """Return an object's properties by name, with NaN for missing values."""
     names = _columns(o)
     if not names:
         return {}
@@ -225,14 +231,14 @@ def _properties(o: _Object, path: Path) -> dict[str, np.ndarray]:
         sizes = o.sizes if len(o.sizes) == len(o.names) else [1] * len(o.names)
         missing = np.repeat([float(v) for v in o.missing], sizes) if o.missing else None
     except ValueError as error:
-        raise InputError(f"{path}: a property is no number: {error}") from error
+        raise InputError(f"{path}: a property is not a number: {error}") from error
     if missing is not None and len(missing) == len(names):
         table = np.where(table == missing, np.nan, table)
     return {name: table[:, j] for j, name in enumerate(names)}
 
 
 def _meta(objects: list[_Object], path: Path) -> Meta:
-    """Return what all objects say of their coordinates."""
+    """Return the unit and coordinate system that all objects share."""
     if any(o.meta != objects[0].meta for o in objects):
         raise InputError(
             f"{path}: its objects have different units or coordinate systems; split the file"

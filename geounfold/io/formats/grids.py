@@ -1,4 +1,4 @@
-"""Block models as files hold them: a frame of three axes, divided into blocks and sub-blocks."""
+"""Block models in files: a grid along three axes, divided into blocks and sub-blocks."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ from geounfold.io.coordinate_columns import side_families
 
 _SIDES = ("dx", "dy", "dz")
 _INDICES = ("i", "j", "k")
-# Cosine of the angle between axes of a frame: single precision of a unit vector, and room.
-_SQUARE = 1e-5
-# More blocks than these are a damaged file's.
-_MOST_BLOCKS = 2**31
+_SQUARE = 1e-5  # largest cosine between two axes; unit vectors in single precision are within it
+_MOST_BLOCKS = 2**31  # number of blocks above which a file counts as damaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +26,13 @@ class Grid:
     Attributes
     ----------
     corner : (3,) float
-        Where the first block begins, in the world.
+        Corner of the first block, world coordinates.
     axes : (3, 3) float
-        Unit vectors along u, v and w, as rows; of either hand.
+        Unit vectors along u, v and w, as rows; right- or left-handed.
     starts : three (n,) float
-        Where the blocks of a row begin along each axis, from the corner.
+        Distance of each block's start from the corner, along each axis.
     widths : three (n,) float
-        How long they are.
+        Length of each block along each axis.
     """
 
     corner: Floats
@@ -44,24 +42,24 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """How many blocks stand along each axis."""
+        """Number of blocks along each axis."""
         u, v, w = (len(width) for width in self.widths)
         return u, v, w
 
     def blocks(self, ijk: Ints, low: Floats | float = 0.0, high: Floats | float = 1.0) -> Blocks:
-        """Return blocks by their place in the rows, or a part of each.
+        """Return blocks of given indices, or a part of each.
 
         Parameters
         ----------
         ijk : (n, 3) int
-            Place along u, v and w, from 0.
+            Indices along u, v and w, from 0.
         low, high : (n, 3) float
-            Where the part begins and ends in its block, as shares of the block's sides.
+            Lower and upper corner of the part in its block, as shares of the block's sides.
 
         Raises
         ------
         ValueError
-            A place outside the grid, or a part outside its block.
+            A block is outside the grid, or a part is outside its block.
         """
         if ijk.size and not (ijk.min() >= 0 and (ijk.max(axis=0) < self.shape).all()):
             raise ValueError("a block lies outside the grid")
@@ -81,11 +79,11 @@ class Blocks:
     Attributes
     ----------
     centres : (n, 3) float
-        Centroids, in the world.
+        Centroids, world coordinates.
     sides : (n, 3) float
         Lengths along the model's own axes.
     ijk : (n, 3) int
-        Place of each block, or of the block that it is a part of, from 0.
+        Indices of each block, from 0; those of the parent block for a sub-block.
     """
 
     centres: Floats
@@ -94,14 +92,27 @@ class Blocks:
 
 
 def tensor_grid(corner: ArrayLike, axes: ArrayLike, widths: Sequence[ArrayLike]) -> Grid:
-    """Return a grid whose rows have blocks of the given lengths, three (n,) float."""
+    """Return a grid of blocks with given lengths along each axis, three (n,) float.
+
+    Raises
+    ------
+    ValueError
+        The axes are not at right angles, or a length is negative or not finite.
+    """
     u, v, w = (np.asarray(width, dtype=np.float64).reshape(-1) for width in widths)
     starts = [np.concatenate(([0.0], np.cumsum(width)[:-1])) for width in (u, v, w)]
     return _checked(Grid(*_frame(corner, axes), (starts[0], starts[1], starts[2]), (u, v, w)))
 
 
 def regular_grid(corner: ArrayLike, axes: ArrayLike, count: ArrayLike, side: ArrayLike) -> Grid:
-    """Return a grid of equal blocks: how many along each axis, and their three lengths."""
+    """Return a grid of equal blocks, given their number along each axis and their three sides.
+
+    Raises
+    ------
+    ValueError
+        The axes are not at right angles, a side is negative or not finite, or there are no blocks
+        or more than 2**31.
+    """
     numbers = [int(n) for n in np.asarray(count).reshape(3)]
     _check_number(numbers)
     lengths = np.asarray(side, dtype=np.float64).reshape(3)
@@ -111,7 +122,7 @@ def regular_grid(corner: ArrayLike, axes: ArrayLike, count: ArrayLike, side: Arr
 
 
 def places(shape: Sequence[int], fastest: Literal["u", "w"]) -> Ints:
-    """Return the places (n, 3) of all blocks, in the order in which `fastest` (u or w) runs first.
+    """Return the indices (n, 3) of all blocks, in the order in which `fastest` (u or w) runs first.
 
     Examples
     --------
@@ -129,10 +140,10 @@ def places(shape: Sequence[int], fastest: Literal["u", "w"]) -> Ints:
 def with_sides(
     data: Mapping[str, np.ndarray], sides: Floats, ijk: Ints | None = None
 ) -> dict[str, np.ndarray]:
-    """Return a block model's values with its sides (dx, dy, dz) and places (i, j, k) behind.
+    """Return a block model's values, followed by its sides (dx, dy, dz) and indices (i, j, k).
 
-    What the file has itself goes before: no sides are added to values that hold sides under any
-    of their usual names, and no three columns of which one is there already.
+    The file's own values take precedence. Sides are not added if the values hold sides under any
+    of their usual names; sides or indices are not added if one column of that name exists.
     """
     names = {name.casefold() for name in data}
     out = dict(data)
@@ -144,7 +155,7 @@ def with_sides(
 
 
 def _frame(corner: ArrayLike, axes: ArrayLike) -> tuple[Floats, Floats]:
-    """Return a corner and unit axes; ValueError where these are not at right angles."""
+    """Return a corner and unit axes; raise ValueError unless these are at right angles."""
     rows = np.asarray(axes, dtype=np.float64).reshape(3, 3)
     lengths = np.linalg.norm(rows, axis=1, keepdims=True)
     if not (np.isfinite(lengths).all() and (lengths > 0).all()):

@@ -1,8 +1,8 @@
 """GSLIB, or simplified GeoEAS: a title, the number of columns, their names, rows of numbers.
 
 Deutsch and Journel 1998, *GSLIB: Geostatistical Software Library*, appendix B. The format has no
-sign for a missing value; what we write names one in the title, and reading takes that one only, as
--999 may be a value in other files. Numbers come back bit for bit.
+code for a missing value. Files written here name one in the title. Reading uses only a code that
+the title names, because -999 may be a value in other files. Numbers are read back bit for bit.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ _MOST_COLUMNS = 10_000
 
 
 def read_frame(path: Path) -> pd.DataFrame:
-    """Return the columns as numbers, names that are there twice numbered.
+    """Return the columns as numbers; repeated names are numbered.
 
     Raises
     ------
     InputError
-        The header is no GSLIB header, a row is short, or a value is no number.
+        The header is no GSLIB header, a row has another number of values, or a value is not a
+        number.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not a GSLIB file: it is no text in UTF-8") from error
+        raise InputError(f"{path}: is not a GSLIB file: it is not text in UTF-8") from error
     words = lines[1].split() if len(lines) > 1 else []
     if not words or not words[0].isdecimal() or not 1 <= int(words[0]) <= _MOST_COLUMNS:
         raise InputError(
@@ -56,25 +57,31 @@ def read_frame(path: Path) -> pd.DataFrame:
         values = np.array([row for _, row in rows], dtype=np.float64)
     except ValueError:
         raise InputError(f"{path}: {_first_word(rows)}") from None
-    said = _MISSING.search(lines[0])
-    if said:
-        values[values == float(said.group(1))] = np.nan
+    missing = _MISSING.search(lines[0])
+    if missing:
+        values[values == float(missing.group(1))] = np.nan
     return pd.DataFrame(dict(zip(unique_names(names), values.T, strict=True)))
 
 
 def _first_word(rows: list[tuple[int, list[str]]]) -> str:
-    """Return where the first value is that is no number."""
+    """Return text that names the first value that is not a number."""
     for k, row in rows:
         for word in row:
             try:
                 float(word)
             except ValueError:
-                return f"line {k} has '{shown(word)}', which is no number"
-    return "a value is no number"
+                return f"line {k} has '{shown(word)}', which is not a number"
+    return "a value is not a number"
 
 
 def write_frame(path: Path, frame: pd.DataFrame, meta: Meta) -> None:
-    """Write columns of numbers as they are, texts as codes that the title names."""
+    """Write columns; texts become codes, which the title lists.
+
+    Raises
+    ------
+    OutputError
+        A column has more than 100 texts.
+    """
     made = {
         name: coded(name, typed_values(frame.iloc[:, i]), "GSLIB")
         for i, name in enumerate(unique_names(frame.columns))

@@ -1,8 +1,8 @@
-"""Mesh files looked over before MeshLab reads them.
+"""Checks of mesh files before MeshLab reads them.
 
-MeshLab's readers crash or never return on some files that end too early, take memory for as many
-vertices as a header claims, read words as zeros and leave out faces whose vertices do not exist.
-What would lead to that is refused here.
+On some files that end too early, MeshLab's readers crash or never return. They allocate memory for
+as many vertices as a header counts, read words as zeros and leave out faces whose vertices do not
+exist. Such files are refused here.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _STL_HEAD, _STL_FACET = 84, 50  # bytes of a binary file's head and of each of i
 
 
 def checked_vertices(path: Path) -> int | None:
-    """Return how many vertices a mesh file has to have, None where its kind does not tell.
+    """Return the number of vertices in a mesh file; None if the format does not count them.
 
     Raises
     ------
     InputError
-        The file is cut, counts more than it holds, or has coordinates or vertex numbers that are
-        none.
+        The file is cut, counts more than it holds, or has a coordinate that is no finite number or
+        a vertex number that does not exist.
     """
     content = path.read_bytes()
     check = {".ply": _ply, ".off": _off, ".stl": _stl, ".obj": _obj}[path.suffix.lower()]
@@ -41,11 +41,11 @@ def checked_vertices(path: Path) -> int | None:
 def _ply(content: bytes) -> int:
     end = _PLY_END.search(content)
     if not content.startswith(b"ply") or end is None:
-        raise ValueError("the header of the PLY file is cut, or none")
+        raise ValueError("the header of the PLY file is cut or missing")
     counts = {name: int(n) for name, n in _PLY_ELEMENT.findall(content[: end.start()])}
     # Every vertex and face takes a byte or more.
     if sum(counts.values()) > len(content) - end.end():
-        raise ValueError(f"the file is cut: it tells of {sum(counts.values())} elements")
+        raise ValueError(f"the file is cut: its header counts {sum(counts.values())} elements")
     return counts.get(b"vertex", 0)
 
 
@@ -59,7 +59,9 @@ def _off(content: bytes) -> int:
         raise ValueError("the header of the OFF file is cut, or none")
     vertices, faces = map(int, counts)
     if len(rows) - start < vertices + faces:
-        raise ValueError(f"the file is cut: it tells of {vertices + faces} vertices and faces")
+        raise ValueError(
+            f"the file is cut: its header counts {vertices + faces} vertices and faces"
+        )
     _check_numbers(row[:3] for row in rows[start : start + vertices])
     for row in rows[start + vertices : start + vertices + faces]:
         corners = [int(word) for word in row[1 : 1 + int(row[0])]]
@@ -80,11 +82,11 @@ def _stl(content: bytes) -> None:
         raise ValueError("the STL file is cut")
     count = int.from_bytes(content[80:_STL_HEAD], "little")
     if len(content) - _STL_HEAD < count * _STL_FACET:
-        raise ValueError(f"the STL file is cut: it tells of {count} triangles")
+        raise ValueError(f"the STL file is cut: its header counts {count} triangles")
     body = np.frombuffer(content, np.uint8, count * _STL_FACET, _STL_HEAD)
     corners = body.reshape(count, _STL_FACET)[:, 12:48].copy().view("<f4")
     if not np.isfinite(corners).all():
-        raise ValueError("it has coordinates that are no finite numbers")
+        raise ValueError("it has coordinates that are not finite numbers")
 
 
 def _obj(content: bytes) -> None:
@@ -105,7 +107,7 @@ def _obj(content: bytes) -> None:
 
 
 def _check_numbers(vertices: Iterable[list[bytes]]) -> None:
-    """Raise where a vertex is not three finite numbers."""
+    """Raise ValueError if a vertex is not three finite numbers."""
     for number, words in enumerate(vertices):
         try:
             good = len(words) >= 3 and bool(np.isfinite([float(w) for w in words]).all())

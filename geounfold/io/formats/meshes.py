@@ -1,8 +1,8 @@
 """PLY, OBJ, OFF and STL: read by MeshLab, written here.
 
 PLY, OBJ and OFF keep every bit of a coordinate. STL holds single precision, in which coordinates of
-millions are off by a quarter of a unit, and no vertex numbers: MeshLab makes one vertex of equal
-corners.
+millions are off by a quarter of a unit. It has no vertex numbers; MeshLab merges equal corners into
+one vertex.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from geounfold.io.formats.registry import Surface
 
 
 def read_surface(path: Path) -> Surface:
-    """Return a mesh file's vertices and faces, polygons cut into triangles.
+    """Return a mesh file's vertices and faces; polygons are cut into triangles.
 
     Raises
     ------
@@ -30,14 +30,14 @@ def read_surface(path: Path) -> Surface:
     V, F = meshlab.read_mesh(path)
     if count is not None and len(V) != count:
         raise InputError(
-            f"{path}: is not a surface: it tells of {count} vertices, but {len(V)} can be used; "
-            "are all of them finite numbers?"
+            f"{path}: is not a surface: it counts {count} vertices, but {len(V)} can be used; "
+            "check that all coordinates are finite numbers"
         )
     return Surface(V, F)
 
 
 def write_surface(path: Path, surface: Surface) -> None:
-    """Write a mesh by the path's ending; PLY and STL are binary, little-endian."""
+    """Write a mesh in the format of the path's ending; PLY and STL are binary, little-endian."""
     writers = {".ply": _ply, ".obj": _obj, ".off": _off, ".stl": _stl}
     path.write_bytes(writers[path.suffix.lower()](surface))
 

@@ -1,4 +1,4 @@
-"""Between tables and points with values: types sorted out, text coded where it cannot stay."""
+"""Conversion between tables and points with values: column types, and codes for text."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _MOST_CODES = 100
 
 
 def to_frame(points: Points) -> pd.DataFrame:
-    """Return points as a table: x, y, z, and their values.
+    """Return points as a table with columns x, y, z and the points' values.
 
-    A value called as a coordinate (in any letter case) gets ``_value`` behind its name, so that
-    no one takes it for one.
+    A value with the name of a coordinate (in any letter case) gets the suffix ``_value``, so that
+    it is not read as one.
     """
     columns: dict[str, np.ndarray] = dict(zip(_AXES, points.xyz.T, strict=True))
     for name, values in points.data.items():
@@ -31,7 +31,7 @@ def to_frame(points: Points) -> pd.DataFrame:
 
 
 def to_points(frame: pd.DataFrame, xyz: Floats, columns: tuple[str, ...], meta: Meta) -> Points:
-    """Return a table's rows as points; `columns` name the coordinates that `xyz` holds."""
+    """Return a table's rows as points; `columns` are the names of the coordinates `xyz`."""
     others = [i for i, name in enumerate(frame.columns) if str(name) not in columns]
     names = unique_names(frame.columns[i] for i in others)
     values = {name: typed_values(frame.iloc[:, i]) for name, i in zip(names, others, strict=True)}
@@ -52,7 +52,7 @@ def typed_values(column: pd.Series) -> np.ndarray:
 
 
 def flattened(name: str, values: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Return an array of a file as columns: vectors become several, numbered from 0."""
+    """Return an array of a file as columns; a vector becomes several, numbered from 0."""
     if values.ndim == 1 or values.size == rows:
         return {name: _plain(values.reshape(rows))}
     wide = values.reshape(rows, -1)
@@ -68,12 +68,12 @@ def _plain(values: np.ndarray) -> np.ndarray:
 
 
 def coded(name: str, values: np.ndarray, what: str) -> tuple[np.ndarray, str]:
-    """Return values as numbers, and the legend of the codes where they are text.
+    """Return values as numbers, and a legend of the codes; the legend is empty for numbers.
 
     Raises
     ------
     OutputError
-        More than 100 different texts: these are names, not classes.
+        There are more than 100 different texts, which are names and not classes.
     """
     if values.dtype.kind in "if":
         return values, ""
@@ -90,7 +90,7 @@ def coded(name: str, values: np.ndarray, what: str) -> tuple[np.ndarray, str]:
 
 
 def missing_code(columns: list[np.ndarray]) -> float | None:
-    """Return a number that stands for missing values and is none of the values; None if none is.
+    """Return a code for missing values that no column holds; None if no value is missing.
 
     Examples
     --------

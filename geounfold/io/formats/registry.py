@@ -1,4 +1,4 @@
-"""Which ending is which format, what it holds, and what passes to and from its module."""
+"""The formats by ending, their contents, and the points and surfaces that their modules use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from geounfold.errors import MissingDependencyError
 from geounfold.geometry.mesh import Floats, Ints
 
 Meta = Mapping[str, str]
-"""What is known of a file's coordinates: ``unit`` and ``crs``, where the format has them."""
+"""A file's ``unit`` and ``crs`` (coordinate reference), as far as they are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +25,9 @@ class Points:
     xyz : (n, 3) float
         Coordinates, z up.
     data : dict of (n,) arrays
-        By name: float64 (NaN where missing), int64, or text as objects (empty where missing).
+        Values by name: float64 (missing: NaN), int64, or text as objects (missing: empty).
     meta : dict of str
-        Unit and coordinate reference, where known.
+        Unit and coordinate reference, if known.
     """
 
     xyz: Floats
@@ -46,7 +46,7 @@ class Surface:
     F : (m, 3) int
         Triangles.
     meta : dict of str
-        Unit and coordinate reference, where known.
+        Unit and coordinate reference, if known.
     """
 
     V: Floats
@@ -61,15 +61,15 @@ class Format:
     Attributes
     ----------
     name : str
-        For messages.
+        Name used in messages.
     module : str
-        In this package.
+        Module of this package.
     reads_points, writes_points, reads_surface, writes_surface : tuple of str
-        The endings that hold these.
+        Endings of files with which the module can do this.
     numbers_only : bool
-        Text columns cannot be written (see `coded`).
+        Whether text columns are written as codes (see `coded`).
     library : str
-        The optional one that the module needs, to write at least; empty for none.
+        Optional library that the module needs, at least for writing; empty for none.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Format:
     library: str = ""
 
     def check_library(self) -> None:
-        """Raise MissingDependencyError where the format's library is not installed."""
+        """Raise MissingDependencyError if the format's library is not installed."""
         if self.library:
             require(self.library, self.name)
 
@@ -103,11 +103,11 @@ FORMATS = (
     Format("DXF", "dxf", (), (), (".dxf",), (".dxf",), library="ezdxf"),
     Format("mesh", "meshes", (), (), _MESHES, _MESHES),
 )
-"""All formats but tables."""
+"""All formats except tables."""
 
 
 def find_format(kind: str, what: str) -> Format | None:
-    """Return the format of an ending that ``reads_points``, ``writes_surface`` ...; or None.
+    """Return the format that can do ``what`` (``reads_points``, ...) with an ending, or None.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def surface_endings(*, writing: bool = False) -> tuple[str, ...]:
 
 
 def require(name: str, what: str) -> ModuleType:
-    """Return an optional library, or raise MissingDependencyError that names its extra."""
+    """Return an optional library; raise MissingDependencyError with its extra's name without it."""
     try:
         return import_module(name)
     except ImportError as error:

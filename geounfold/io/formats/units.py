@@ -1,4 +1,4 @@
-"""Names of length units, which every format spells in its own way."""
+"""Names of length units, which formats spell differently."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NAMES = {
 
 
 def unit_name(text: str) -> str:
-    """Return a unit's short name; one that is not known stays as it is.
+    """Return a unit's short name; an unknown unit is returned unchanged.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """VTK's XML files through pyvista: points, block models and triangles.
 
 Floats are written and read as float64, bit for bit. Unit and coordinate reference are field data
-called ``unit`` and ``crs``, as VTK has no place of its own for them.
+called ``unit`` and ``crs``, because VTK has no entry for them.
 """
 
 from __future__ import annotations
@@ -25,10 +25,15 @@ _META = ("unit", "crs")
 
 
 def read_points(path: Path) -> Points:
-    """Return the centres of a file's solid cells with cell data; without any, its points.
+    """Return the centres of a file's solid cells with cell data; without such cells, its points.
 
-    Cells that VTK hides as ghosts are left out. Boxes bring their sides along
-    (dx, dy, dz), those of an image their places too (i, j, k).
+    Cells that VTK hides as ghosts are left out. Boxes get columns with their sides (dx, dy, dz);
+    those of an image also get their indices (i, j, k).
+
+    Raises
+    ------
+    InputError
+        The file is damaged, or holds no points.
     """
     mesh = _read(path)
     solid = _solid(mesh)
@@ -43,7 +48,7 @@ def read_points(path: Path) -> Points:
     keep = np.ones(mesh.n_points, dtype=bool)
     data = mesh.point_data
     points = np.asarray(mesh.points, dtype=np.float64)
-    # One vertex cell for each point, as we write them, may carry the values instead.
+    # If there is one vertex cell for each point, as in files written here, it may hold the values.
     if not len(data) and len(mesh.cell_data) and _is_cloud(mesh):
         data, points = mesh.cell_data, np.asarray(mesh.cell_centers().points, dtype=np.float64)
     return Points(points, _values(data, mesh.n_points, keep), _meta(mesh))
@@ -58,7 +63,7 @@ def write_points(path: Path, points: Points) -> None:
 
 
 def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
-    """Return points (n, 3) as pyvista poly data with their values (texts as object arrays)."""
+    """Return points (n, 3) and their values (texts: object arrays) as pyvista poly data."""
     import pyvista
 
     mesh: Any = pyvista.PolyData(np.array(xyz, dtype=np.float64, order="C"))
@@ -71,7 +76,7 @@ def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
 
 
 def read_surface(path: Path) -> Surface:
-    """Return a poly data file's faces, polygons cut into triangles."""
+    """Return a poly data file's faces; polygons are cut into triangles."""
     mesh = _read(path)
     if not mesh.GetNumberOfPolys() + mesh.GetNumberOfStrips():
         raise InputError(f"{path}: holds no faces")
@@ -104,7 +109,7 @@ def add_text(data: Any, name: str, words: Iterable[str]) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep from stderr what VTK's error codes tell as well."""
+    """Suppress VTK's messages on stderr; its error codes report the same."""
     from vtkmodules.vtkCommonCore import vtkObject
 
     shown = vtkObject.GetGlobalWarningDisplay()
@@ -132,7 +137,7 @@ def _read(path: Path) -> Any:
 
 
 def _solid(mesh: Any) -> np.ndarray:
-    """Return which cells have a volume."""
+    """Return whether each cell has a volume, (n,)."""
     import pyvista
 
     if isinstance(mesh, pyvista.ImageData):
@@ -152,7 +157,7 @@ def _solid(mesh: Any) -> np.ndarray:
 def _with_sides(
     mesh: Any, values: dict[str, np.ndarray], keep: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return the values of kept cells, with sides where these are blocks along the file's axes."""
+    """Return the values of kept cells, with their sides if all of them are boxes."""
     import pyvista
 
     if isinstance(mesh, pyvista.ImageData):
@@ -164,10 +169,10 @@ def _with_sides(
 
 
 def _box_sides(mesh: Any, keep: np.ndarray) -> Floats | None:
-    """Return the sides (n, 3) of kept cells; None where they are not all boxes of one cell type."""
+    """Return the sides (n, 3) of kept cells; None unless all are boxes of one cell type."""
     import pyvista
 
-    # Of a cell's eight corners, those at the ends of the edges from the first, and the opposite.
+    # Of a cell's eight corners: the ends of the three edges from the first, and the opposite one.
     ends = {
         int(pyvista.CellType.VOXEL): [1, 2, 4, 7],
         int(pyvista.CellType.HEXAHEDRON): [1, 3, 4, 6],
@@ -180,7 +185,7 @@ def _box_sides(mesh: Any, keep: np.ndarray) -> Floats | None:
     edges = points[corners[:, ends[int(kinds[0])]]] - points[corners[:, :1]]
     along, opposite = edges[:, :3], edges[:, 3]
     sides: Floats = np.linalg.norm(along, axis=2)
-    # Corners lie where the floats of the file's own precision put them.
+    # Corners are rounded to the precision of the file's floats.
     room = 1e-6 * sides.max(axis=1) + 8 * _spacing(mesh.points)
     skew = np.einsum("nac,nbc->nab", along, along) * (1 - np.eye(3))
     square = np.abs(skew).max(axis=(1, 2)) <= room * sides.max(axis=1)
@@ -232,8 +237,8 @@ def _save(mesh: Any, path: Path, meta: Meta) -> None:
 def save(mesh: Any, path: Path) -> None:
     """Write poly data (.vtp) or an unstructured grid (.vtu).
 
-    pyvista's own `save` does not look at what the writer says: on a full disk it leaves half a
-    file and goes on.
+    pyvista's own `save` ignores the writer's error code, so on a full disk it leaves half a file
+    without an error.
 
     Raises
     ------

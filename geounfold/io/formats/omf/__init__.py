@@ -1,16 +1,16 @@
 """OMF, the Open Mining Format: read in all versions, written by its Python library.
 
-A file holds a project of elements; one of them is read: a point set, else a block model, whose
-blocks' centroids become points; or a surface. Three layouts go by the same ending:
+A file holds a project of elements, of which one is read: a point set; without one, a block model,
+whose centroids become points; or a surface. Three layouts have the same ending:
 
 - version 1 (`version1`): w runs fastest through a volume's cells;
 - version 2 (`version2`): a zip archive of Parquet tables; u runs fastest;
 - the pre-release 2.0.0a0 of the Python library (`prerelease`): a zip archive of plain arrays.
 
-Reading needs no library. The stable one reads version 1 only, the pre-release its own layout only,
-and not all of what it writes. Writing (`writing`) needs it, and gives what the installed one can:
-version 1 by ``omf`` 1.0.1, its own layout by 2.0.0a0 (extra ``formats``). Units and coordinate
-reference are carried where the version has them. Floats come back bit for bit.
+Reading needs no library: the stable library reads version 1 only, and the pre-release only its own
+layout, and not all of it. Writing (`writing`) needs the library (extra ``formats``): ``omf`` 1.0.1
+writes version 1, and 2.0.0a0 its own layout. Units and coordinate reference are kept if the
+version has them. Floats are read back bit for bit.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ __all__ = ["read_points", "read_surface", "write_points", "write_surface"]
 
 
 def read_points(path: Path) -> Points:
-    """Return the one point set of a file, or the one block model's blocks where there is none.
+    """Return the one point set of a file; without one, the blocks of the one block model.
 
     Raises
     ------
     InputError
-        Not an OMF file, or not one such element.
+        The file is no OMF file, is damaged, or has no such element or several.
     """
-    with _damage_told(path):
+    with _damage_reported(path):
         elements = _elements(path)
         for kind in (Kind.POINTS, Kind.BLOCKS):
             found = _one(path, elements, kind)
@@ -53,7 +53,7 @@ def read_points(path: Path) -> Points:
 
 def read_surface(path: Path) -> Surface:
     """Return the one triangulated surface of a file."""
-    with _damage_told(path):
+    with _damage_reported(path):
         found = _one(path, _elements(path), Kind.SURFACE)
         if found is None:
             raise InputError(f"{path}: holds no surface of triangles")
@@ -62,7 +62,7 @@ def read_surface(path: Path) -> Surface:
 
 
 def _elements(path: Path) -> list[Element]:
-    """Return what a file holds, whatever its version."""
+    """Return the elements of a file of any version."""
     with path.open("rb") as stream:
         head = stream.read(4)
     if head == version1.MAGIC:
@@ -82,24 +82,24 @@ def _elements(path: Path) -> list[Element]:
 
 
 def _one(path: Path, elements: list[Element], kind: Kind) -> Element | None:
-    """Return the only element of a kind, or None where there is none."""
+    """Return the only element of a kind; None if there is none."""
     found = [element for element in elements if element.kind is kind]
     if len(found) > 1:
         raise InputError(
             f"{path}: holds several elements of one kind ({listing(e.name for e in found)}); "
-            "export the one that is meant"
+            "export a single one"
         )
     return found[0] if found else None
 
 
 @contextmanager
-def _damage_told(path: Path) -> Iterator[None]:
-    """Make one InputError of what a damaged file brings about while it is taken apart."""
+def _damage_reported(path: Path) -> Iterator[None]:
+    """Raise InputError for every error to which a damaged file leads while it is read."""
     try:
         yield
     except OSError as error:
-        # The disk's fault, but that a broken gzip or Parquet has no number, and that a place before
-        # the file's beginning, to which a wrong number leads, is no valid one.
+        # An error of the disk has a number. Broken gzip or Parquet has none, and a position before
+        # the file's beginning, to which a wrong number leads, gives EINVAL.
         if error.errno not in (None, errno.EINVAL):
             raise
         raise _damaged(path, error) from error

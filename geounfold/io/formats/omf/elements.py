@@ -1,4 +1,4 @@
-"""What all versions of OMF have in common: elements of a kind, with values beside them."""
+"""Parts common to all versions of OMF: elements of a kind, and their values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from geounfold.io.formats.units import unit_name
 
 
 class Kind(Enum):
-    """What an element is to geounfold."""
+    """Kinds of elements."""
 
     POINTS = "points"
     BLOCKS = "blocks"
@@ -30,16 +30,16 @@ class Kind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """One element of a project, loaded when it is asked for.
+    """One element of a project, loaded on demand.
 
     Attributes
     ----------
     name : str
-        As in the file.
+        Name in the file.
     kind : Kind
-        What it is.
+        The element's kind.
     load : function
-        Returns its `Points`, or its `Surface`.
+        Function that returns the element's `Points` or `Surface`.
     """
 
     name: str
@@ -48,12 +48,12 @@ class Element:
 
 
 def values_by_name(found: Iterable[tuple[str, np.ndarray]], rows: int) -> dict[str, np.ndarray]:
-    """Return arrays as columns: nameless ones numbered, names that come again too.
+    """Return arrays as columns; arrays without a name and repeated names are numbered.
 
     Raises
     ------
     ValueError
-        An array has not one value, or vector, for each row.
+        An array does not have one value, or vector, for each row.
     """
     arrays = list(found)
     names = unique_names(name or f"data_{k}" for k, (name, _) in enumerate(arrays))
@@ -68,12 +68,14 @@ def values_by_name(found: Iterable[tuple[str, np.ndarray]], rows: int) -> dict[s
 def of_parents(
     found: Iterable[tuple[str, np.ndarray]], parent: Ints, count: int
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield values of ``count`` parent blocks at their sub-blocks, whose rows ``parent`` (n,) are.
+    """Yield values of ``count`` parent blocks for each sub-block.
+
+    ``parent`` (n,) is the row of each sub-block's parent.
 
     Raises
     ------
     ValueError
-        An array has not one value for each parent block.
+        An array does not have one value for each parent block.
     """
     for name, array in found:
         if len(array) != count:
@@ -82,13 +84,13 @@ def of_parents(
 
 
 def block_points(blocks: Blocks, found: Iterable[tuple[str, np.ndarray]], meta: Meta) -> Points:
-    """Return a block model's centroids with its values, sides and places."""
+    """Return a block model's centroids with its values, sides and indices."""
     values = values_by_name(found, len(blocks.ijk))
     return Points(blocks.centres, with_sides(values, blocks.sides, blocks.ijk), meta)
 
 
 def words_of(codes: np.ndarray, legend: Mapping[int, str]) -> np.ndarray:
-    """Return the words of codes (n,), blank where a code has none.
+    """Return the words of codes (n,); an unknown code gets an empty word.
 
     Examples
     --------
@@ -101,16 +103,16 @@ def words_of(codes: np.ndarray, legend: Mapping[int, str]) -> np.ndarray:
 
 
 def vector(value: Any) -> Floats:
-    """Return three numbers of an index, (3,)."""
+    """Return three numbers of an index as an array, (3,)."""
     return np.asarray(value, dtype=np.float64).reshape(3)
 
 
 def unread_version(path: Path, version: object) -> InputError:
-    """Return the error that names a file's version, which is none of those that are read."""
+    """Return the error for a file of a version that cannot be read."""
     return InputError(f"{path}: is an OMF file of a version that is not read: {version!r}")
 
 
-def told(unit: str | None, reference: str | None) -> Meta:
-    """Return what is known of the coordinates."""
+def coordinate_meta(unit: str | None, reference: str | None) -> Meta:
+    """Return unit and coordinate reference, without those that are empty."""
     meta = {"unit": unit_name(unit or ""), "crs": (reference or "").strip()}
     return {key: value for key, value in meta.items() if value}

@@ -1,12 +1,12 @@
 """The layout of the Python library's pre-release 2.0.0a0: a zip archive of JSON and plain arrays.
 
-``project.json`` holds the project; its arrays name the archive's members that hold their bytes.
-Block models come in five kinds. Their blocks stand in the order in which u runs fastest; ``cbc``
-counts the sub-blocks of each (0: no block there), which follow each other. Regular sub-blocks have
-the same order within their block, octrees are given by their Z-order curve.
+``project.json`` holds the project; every array in it names the archive's member with its bytes.
+There are five kinds of block models. In their order of blocks u runs fastest. ``cbc`` holds the
+number of sub-blocks of each block (0: no block there), which are listed one after the other.
+Regular sub-blocks have the same order within their block; octrees are given by their Z-order curve.
 
-Elements are told apart by what they hold, as the library gives one kind no name of its own, and so
-does not read it back.
+The kind of an element follows from its entries, because the library writes no name for one kind
+(which it cannot read back either).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
+    coordinate_meta,
     of_parents,
-    told,
     unread_version,
     values_by_name,
     words_of,
@@ -37,13 +37,13 @@ from geounfold.io.formats.registry import Meta, Points, Surface
 
 INDEX = "project.json"
 _VERSIONS = ("2.0", None)
-# Of the octree: bits of a place in the curve's pointer, and those before it for the level.
-_DEPTH, _LEVEL_BITS = 8, 4
+_DEPTH = 8  # bits of an octree's position along each axis
+_LEVEL_BITS = 4  # bits of its level, the lowest ones
 
 
 @dataclass(frozen=True, eq=False)
 class _File:
-    """A file and what its project says of coordinates."""
+    """A file and its project's metadata."""
 
     path: Path
     metadata: dict[str, Any]
@@ -65,16 +65,16 @@ class _File:
     def meta(self, entry: dict[str, Any]) -> Meta:
         own = entry.get("metadata", {}).get("coordinate_reference_system")
         whole = self.metadata.get("coordinate_reference_system")
-        return told(self.metadata.get("units"), own or whole)
+        return coordinate_meta(self.metadata.get("units"), own or whole)
 
 
 def elements(path: Path) -> list[Element]:
-    """Return the elements of a file, those of composites too.
+    """Return the elements of a file, including those of composites.
 
     Raises
     ------
     InputError
-        Another version.
+        The file has another version.
     """
     with zipfile.ZipFile(path) as archive:
         project = json.loads(archive.read(INDEX))
@@ -124,7 +124,7 @@ def _block_model(file: _File, entry: dict[str, Any]) -> Points:
 
 
 def _blocks(file: _File, entry: dict[str, Any]) -> tuple[Blocks, Ints]:
-    """Return the blocks, and how many stand in each parent block that has any."""
+    """Return the blocks, and their number in each parent block that has any."""
     corner, axes = entry["corner"], [entry[f"axis_{a}"] for a in "uvw"]
     if "tensor_w" in entry:
         grid = tensor_grid(corner, axes, [entry[f"tensor_{a}"] for a in "uvw"])
@@ -146,13 +146,13 @@ def _blocks(file: _File, entry: dict[str, Any]) -> tuple[Blocks, Ints]:
 def _parts(
     file: _File, entry: dict[str, Any], counts: Ints
 ) -> tuple[Floats | float, Floats | float]:
-    """Return where sub-blocks begin and end in their parents, as shares of its sides."""
+    """Return lower and upper corners of sub-blocks, as shares of their parent's sides."""
     if "zoc" in entry:
         low, side = _octree(np.asarray(file.array(entry["zoc"]), dtype=np.int64))
         return low, low + side
     if "sub_block_corners" in entry:
         low = np.asarray(file.array(entry["sub_block_corners"]), dtype=np.float64)
-        # Rounding may carry the sum of two shares past the whole.
+        # Rounding may make the sum of two shares greater than 1.
         sides = np.asarray(file.array(entry["sub_block_sizes"]), dtype=np.float64)
         return low, _to_whole(low + sides)
     if "sub_block_count" in entry:
@@ -177,8 +177,8 @@ def _regular(division: Ints, counts: Ints) -> tuple[Floats, Floats]:
 def _octree(curve: Ints) -> tuple[Floats, Floats]:
     """Return corner and side of octree sub-blocks, as shares of their block's sides.
 
-    A value holds the level in its last four bits, above them the corner in units of 1/256 of the
-    block: bits 0, 3, 6 ... are those of u, the next those of v, the next those of w.
+    The last four bits of a value are the level. The bits above them are the corner, in units of
+    1/256 of the block: bits 0, 3, 6, ... for u, 1, 4, 7, ... for v, and 2, 5, 8, ... for w.
     """
     level = curve & (2**_LEVEL_BITS - 1)
     if (level > _DEPTH).any() or (curve < 0).any():

@@ -1,7 +1,7 @@
 """OMF 1: a header of 60 bytes, arrays compressed one by one, and an index in JSON at the end.
 
-The header holds a magic number, the version, the project's identifier and where the index begins.
-In the index every object is found by its identifier; arrays tell where their bytes are.
+The header holds a magic number, the version, the project's identifier and the position of the
+index. The index holds every object under its identifier; arrays hold the position of their bytes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
-    told,
+    coordinate_meta,
     unread_version,
     values_by_name,
     vector,
@@ -71,7 +71,7 @@ class _File:
 
     @property
     def meta(self) -> Meta:
-        return told(self.project.get("units"), None)
+        return coordinate_meta(self.project.get("units"), None)
 
 
 def elements(path: Path) -> list[Element]:
@@ -80,7 +80,7 @@ def elements(path: Path) -> list[Element]:
     Raises
     ------
     InputError
-        Another version.
+        The file has another version.
     """
     with path.open("rb") as stream:
         _, version, key, start = _HEADER.unpack(stream.read(_HEADER.size))
@@ -108,7 +108,7 @@ def _blocks(file: _File, entry: dict[str, Any], geometry: dict[str, Any]) -> Poi
     corner = vector(geometry["origin"]) + file.origin
     axes, widths = ([geometry[f"{what}_{a}"] for a in "uvw"] for what in ("axis", "tensor"))
     grid = tensor_grid(corner, axes, widths)
-    # The library's own examples flatten arrays of (u, v, w): w runs fastest.
+    # w runs fastest: the library's own examples flatten arrays of (u, v, w).
     return block_points(
         grid.blocks(places(grid.shape, "w")), _values(file, entry, "cells"), file.meta
     )
@@ -133,7 +133,7 @@ def _vertices(file: _File, geometry: dict[str, Any]) -> Floats:
 
 
 def _values(file: _File, entry: dict[str, Any], location: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield an element's data at a location, mapped ones as their legend's words."""
+    """Yield an element's data at a location; mapped data as their legend's words."""
     for data in (file.index[key] for key in entry.get("data", [])):
         if data["location"] != location:
             continue
@@ -144,7 +144,7 @@ def _values(file: _File, entry: dict[str, Any], location: str) -> Iterator[tuple
 
 
 def _legend(file: _File, keys: list[str]) -> list[str]:
-    """Return the words of the first legend that has any, else its colours."""
+    """Return the words of the first legend that has any; without words, the first one's values."""
     columns = [file.array(file.index[key]["values"]) for key in keys]
     words = next((c for c in columns if c.dtype == object), columns[0])
     return [str(v) if isinstance(v, str) else ",".join(str(x) for x in np.ravel(v)) for v in words]

@@ -1,8 +1,8 @@
 """OMF 2: a zip archive of an index in JSON and of arrays as Parquet tables.
 
 The archive's comment names format and version. In the index, geometries and attributes have a
-``type`` each, and arrays the name of their member. Blocks, and their values, stand in the order in
-which u runs fastest; sub-blocks in any, each with the place of its parent block.
+``type``, and arrays have the name of their member. In the order of blocks and their values u runs
+fastest. Sub-blocks are in any order, each with the indices of its parent block.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from geounfold.io.formats.omf.elements import (
     Element,
     Kind,
     block_points,
+    coordinate_meta,
     of_parents,
-    told,
     unread_version,
     values_by_name,
     vector,
@@ -73,16 +73,16 @@ class _File:
     @property
     def meta(self) -> Meta:
         project = self.project
-        return told(project.get("units"), project.get("coordinate_reference_system"))
+        return coordinate_meta(project.get("units"), project.get("coordinate_reference_system"))
 
 
 def elements(path: Path) -> list[Element]:
-    """Return the elements of a file, those of composites too.
+    """Return the elements of a file, including those of composites.
 
     Raises
     ------
     InputError
-        Another version.
+        The file has another version.
     """
     with zipfile.ZipFile(path) as archive:
         version = archive.comment.removeprefix(COMMENT).decode("latin-1")
@@ -162,7 +162,7 @@ def _subblocks(file: _File, grid: Grid, parts: dict[str, Any]) -> Blocks:
 
 
 def _values(file: _File, entry: dict[str, Any], location: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield an element's attributes at a location, categories as their names."""
+    """Yield an element's attributes at a location; categories as their names."""
     for attribute in entry.get("attributes", []):
         data = attribute["data"]
         if attribute["location"] != location or "values" not in data:
@@ -175,9 +175,9 @@ def _values(file: _File, entry: dict[str, Any], location: str) -> Iterator[tuple
 
 
 def _plain(table: Any) -> np.ndarray:
-    """Return a table's one column: missing numbers as NaN, missing texts as blanks.
+    """Return a table's one column; missing numbers are NaN, missing texts empty.
 
-    Dates become texts, vectors and colours rows of an (n, wide) array.
+    Dates become texts; vectors and colours become rows of an (n, wide) array.
     """
     import pyarrow as pa
     from pyarrow import compute
@@ -193,7 +193,7 @@ def _plain(table: Any) -> np.ndarray:
 
 
 def _numbers(column: Any) -> np.ndarray:
-    """Return whole numbers as they are where none is missing, else floats with NaN."""
+    """Return a column of numbers; if values are missing, as floats with NaN."""
     import pyarrow as pa
     from pyarrow import compute
 

@@ -1,4 +1,4 @@
-"""OMF files written by the installed library, in the version that this one has."""
+"""OMF files, written by the installed library in its own version."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def write_surface(path: Path, surface: Surface) -> None:
 
 @contextmanager
 def _library() -> Iterator[Any]:
-    """Yield the library, and keep what it says of NumPy's later versions to itself."""
+    """Yield the library; its warnings about later versions of NumPy are suppressed."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         yield require("omf", "OMF")
@@ -70,7 +70,7 @@ def _write(path: Path, omf: Any, element: Any, meta: Meta) -> None:
         project.validate()
         omf.OMFWriter(project, str(path))
         return
-    # This version has a place for the coordinate reference, and takes whatever else is put there.
+    # This version has an entry for the coordinate reference, and accepts any other entry.
     names = {"crs": "coordinate_reference_system", "unit": "units"}
     project = omf.Project(name=path.stem, description="", elements=[element])
     project.metadata = {name: meta[key] for key, name in names.items() if key in meta}

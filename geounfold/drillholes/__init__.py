@@ -1,8 +1,8 @@
-"""Drill-holes: collar, survey and assay tables to samples and traces in space.
+"""Drill-holes: from collar, survey and assay tables to samples and traces in space.
 
-Stages, each a module: `tables` finds columns and reads numbers, `checks` names the rows that
-cannot be used, `desurvey` computes paths by minimum curvature, `composite` averages grades over
-equal lengths; `holes` puts them together.
+Each stage is a module. `tables` finds columns and reads numbers. `checks` names the rows that
+cannot be used. `desurvey` computes paths by minimum curvature. `composite` averages grades over
+equal lengths. `holes` runs all stages.
 """
 
 from geounfold.drillholes.composite import RESIDUALS, CompositeOptions

@@ -1,6 +1,6 @@
-"""Which rows of the tables can be used: every other one is named, and what was done with it.
+"""Checks of the tables' rows: each unusable row becomes a finding with the action taken.
 
-Nothing is mended by guessing. Rows are left out or cut as each check states; a hole that has
+No value is guessed. Each check states whether it leaves rows out or cuts them. A hole that has
 assays and cannot be placed is an error.
 """
 
@@ -19,31 +19,31 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 
 LEFT_OUT = "left out"
 
-_FAR = 3.0  # times the deepest assay of a hole: a survey below that, and below all assays, is none
-_SLACK = 1.05  # of the depth that the collar table gives: how far below it a survey may lie
-_ROUNDING = 1e-6  # of a depth: differences that are none
-_SHARP = 90.0  # degrees between two stations that no drill turns
-_REVERSED = 179.0  # degrees beyond which no arc is defined
+_FAR = 3.0  # deepest assays of a hole; a survey below that and below all assays is left out
+_SLACK = 1.05  # depths of the collar table; a survey below that is left out
+_ROUNDING = 1e-6  # differences below this share of a depth are ignored as rounding
+_SHARP = 90.0  # degrees between two stations; no drill turns by more
+_REVERSED = 179.0  # degrees between two stations; beyond it the arc is undefined
 
 
 @dataclass(frozen=True, eq=False)
 class Collars:
-    """Where holes begin, one row for each.
+    """Collars of the holes, one row per hole.
 
     Attributes
     ----------
     source : str
-        The table.
+        Name of the collar table.
     names : (h,) object
-        Names of holes.
+        Names of the holes.
     points : (h, 3) float
-        Coordinates.
+        Coordinates of the collars, in the table's unit.
     depth : (h,) float
-        Length of the hole, NaN where not given.
+        Length of the hole; NaN if not given.
     azimuth, dip : (h,) float
-        Direction at the collar, degrees as in the table; NaN where not given.
+        Direction at the collar, degrees as in the table; NaN if not given.
     row : (h,) int
-        Data rows.
+        Data row of the collar table, from 1.
     """
 
     source: str
@@ -58,7 +58,7 @@ class Collars:
         return len(self.names)
 
     def find(self, names: np.ndarray) -> Ints:
-        """Return the holes of names, (n,); -1 where there is none."""
+        """Return the index of the hole of each name, (n,); -1 if no hole has the name."""
         return np.asarray(pd.Index(self.names).get_indexer(pd.Index(names)), dtype=np.int64)
 
 
@@ -75,7 +75,7 @@ class Stations:
     azimuth, dip : (s,) float
         Degrees; dip as in the table.
     row : (s,) int
-        Data rows of the survey table; 0 where the collar table gave the direction.
+        Data row of the survey table, from 1; 0 if the direction is that of the collar table.
     """
 
     hole: Ints
@@ -85,7 +85,7 @@ class Stations:
     row: Ints
 
     def kept(self, keep: Bools) -> Stations:
-        """Return some of the stations."""
+        """Return the stations to keep."""
         return Stations(
             self.hole[keep], self.depth[keep], self.azimuth[keep], self.dip[keep], self.row[keep]
         )
@@ -102,7 +102,7 @@ class Intervals:
     start, end : (n,) float
         Lengths along the hole.
     position : (n,) int
-        Place of each in the table as read.
+        Index of each interval in the table as read, from 0.
     """
 
     hole: Ints
@@ -111,15 +111,15 @@ class Intervals:
     position: Ints
 
     def kept(self, keep: Bools) -> Intervals:
-        """Return some of the intervals."""
+        """Return the intervals to keep."""
         return Intervals(self.hole[keep], self.start[keep], self.end[keep], self.position[keep])
 
 
 def checked_collars(table: HoleTable, assayed: set[str], log: Log) -> Collars:
     """Return one collar for each hole that has coordinates.
 
-    A name that is there twice with the same coordinates keeps its first row. With other
-    coordinates no one can say where the hole is: none of its rows is kept.
+    If a name is repeated with the same coordinates, its first row is kept. If the coordinates
+    differ, the hole's position is unknown and none of its rows is kept.
     """
     points = np.column_stack([table.numbers[axis] for axis in "xyz"])
     whole = np.isfinite(points).all(axis=1)
@@ -150,7 +150,7 @@ def checked_collars(table: HoleTable, assayed: set[str], log: Log) -> Collars:
 
 
 def checked_intervals(table: HoleTable, log: Log) -> tuple[Bools, np.ndarray]:
-    """Return which intervals have a length, and the names of holes that have one."""
+    """Return which intervals have a length, and the names of the holes with such intervals."""
     start, end = table.numbers["from"], table.numbers["to"]
     good = np.ones(len(table), dtype=bool)
     for check, bad in (
@@ -170,9 +170,9 @@ def checked_intervals(table: HoleTable, log: Log) -> tuple[Bools, np.ndarray]:
 def placed_intervals(table: HoleTable, good: Bools, collars: Collars, log: Log) -> Intervals:
     """Return the intervals of holes with a collar, cut so that none overlaps another.
 
-    Of two intervals that begin at the same depth the shorter is kept (of equal ones the first
-    row); one that runs into the next ends where that begins; one that runs below the depth
-    that the collar table gives ends there.
+    Of two intervals that begin at the same depth the shorter is kept; of equal ones, the first
+    row. An interval that overlaps the next is cut at the start of the next. An interval that
+    runs below the hole's depth in the collar table is cut at that depth.
     """
     hole = collars.find(table.hole)
     named = dict.fromkeys(table.hole[good & (hole < 0)])
@@ -218,14 +218,14 @@ def checked_stations(
 ) -> Stations:
     """Return the stations that can be used, with the collar table's directions where needed.
 
-    A station is left out where a value is missing or no direction, where its depth is negative
-    or far beyond the hole (past 1.05 times the collar table's depth; without one, past 3 times
-    the hole's deepest assay and past every assay of all holes), and where it repeats the depth
-    of another. Two directions at one depth keep the first row.
+    A station is left out if a value is missing or not a valid angle, or if its depth is negative,
+    far below the hole or repeated. Far below the hole means beyond 1.05 times the collar table's
+    depth. If that depth is not given, it means beyond 3 times the hole's deepest assay and
+    beyond every assay of all holes. Of two stations at one depth the first row is kept.
     """
     hole = collars.find(table.hole)
     depth, azimuth, dip = (table.numbers[n].copy() for n in ("at", "azimuth", "dip"))
-    azimuth[np.isnan(azimuth) & (np.abs(dip) == 90.0)] = 0.0  # a vertical hole has none
+    azimuth[np.isnan(azimuth) & (np.abs(dip) == 90.0)] = 0.0  # a vertical hole needs no azimuth
     good = np.ones(len(table), dtype=bool)
     reach = _reach(hole, collars, intervals)
     missing = ~(np.isfinite(depth) & np.isfinite(azimuth) & np.isfinite(dip))
@@ -252,7 +252,7 @@ def checked_stations(
 
 
 def _reach(hole: Ints, collars: Collars, intervals: Intervals) -> Floats:
-    """Return for each survey row the depth beyond which it cannot be of its hole."""
+    """Return for each survey row the greatest depth that its hole can have."""
     if not len(intervals.hole):
         return np.full(len(hole), np.inf)
     deepest = np.zeros(len(collars))
@@ -266,9 +266,9 @@ def _reach(hole: Ints, collars: Collars, intervals: Intervals) -> Floats:
 def _with_collar_directions(
     stations: Stations, collars: Collars, assayed: set[str], log: Log
 ) -> Stations:
-    """Return the stations, holes without any taking the collar table's direction.
+    """Return the stations, plus the collar table's direction for holes without a survey.
 
-    Holes that have neither are findings: they cannot be placed.
+    A hole without either cannot be placed and becomes a finding.
     """
     bare = np.setdiff1d(np.arange(len(collars)), stations.hole)
     azimuth = np.where(np.abs(collars.dip) == 90.0, 0.0, collars.azimuth)
@@ -279,7 +279,7 @@ def _with_collar_directions(
             collars.source,
             "unsurveyed hole",
             WARNING if given else _grave(collars.names[k], assayed),
-            "the collar table's direction taken all along" if given else "hole left out",
+            "the collar table's direction used along the whole hole" if given else "hole left out",
             hole=str(collars.names[k]),
             row=int(collars.row[k]),
         )
@@ -297,26 +297,26 @@ def _with_collar_directions(
 
 
 def dip_positive_down(dip: Floats, stated: bool | None, source: str, log: Log) -> bool:
-    """Return whether positive dips point down, as stated or as all dips show.
+    """Return whether positive dips point down, as stated or from the signs of the dips.
 
-    Holes are drilled downwards as a rule, so dips of one sign show the convention. Dips of both
-    signs show nothing.
+    Most holes are drilled downwards, so dips of one sign imply the convention. Dips of both signs
+    do not.
 
     Parameters
     ----------
     dip : (s,) float
         Degrees, as in the tables.
     stated : bool, optional
-        What the user says.
+        Convention that the user states.
     source : str
-        The survey table.
+        Name of the survey table.
     log : Log
-        Takes the findings.
+        Collects the findings.
 
     Raises
     ------
     InputError
-        Dips of both signs, and nothing stated.
+        The dips have both signs and the user states no convention.
     """
     up, down = int(np.count_nonzero(dip < 0)), int(np.count_nonzero(dip > 0))
     spread = f"{dip.min():g} to {dip.max():g} degrees" if len(dip) else "none"
@@ -329,25 +329,25 @@ def dip_positive_down(dip: Floats, stated: bool | None, source: str, log: Log) -
         return stated
     if up and down:
         raise InputError(
-            f"{source}: dips have both signs ({down} positive, {up} negative), which does not show "
-            "which way is down: state --dip-positive-down or --no-dip-positive-down"
+            f"{source}: dips have both signs ({down} positive, {up} negative), so the "
+            "convention is unknown: state --dip-positive-down or --no-dip-positive-down"
         )
     positive = not up
     log.add(
         source,
-        f"no dip is {'negative' if positive else 'positive'}, as where positive dips point "
+        f"no dip is {'negative' if positive else 'positive'}, so positive dips seem to point "
         f"{'down' if positive else 'up'}",
         NOTE,
-        f"taken so; state it by --{'' if positive else 'no-'}dip-positive-down",
+        f"assumed; state it by --{'' if positive else 'no-'}dip-positive-down",
         detail=spread,
     )
     return positive
 
 
 def checked_turns(stations: Stations, collars: Collars, source: str, log: Log) -> Stations:
-    """Return the stations without those that turn a hole back on itself; sharp turns are named.
+    """Return the stations without those that turn a hole back on itself; report sharp turns.
 
-    Dips are positive down here.
+    Dips must be positive down.
     """
     while True:
         t = directions(stations.azimuth, stations.dip)
@@ -355,11 +355,11 @@ def checked_turns(stations: Stations, collars: Collars, source: str, log: Log) -
         same = stations.hole[1:] == stations.hole[:-1]
         turn[1:] = np.where(same, np.degrees(dogleg(t[:-1], t[1:])), 0.0)
         back = turn > _REVERSED
-        back[1:] &= ~back[:-1]  # one at a time: the next is measured anew
+        back[1:] &= ~back[:-1]  # one at a time: leaving out a station changes the next turn
         check, action = "direction turned back on itself", LEFT_OUT
         chosen = back if back.any() else turn > _SHARP
         if not back.any():
-            check, action = "hole turned by more than a right angle", "kept as it stands"
+            check, action = "hole turned by more than a right angle", "kept unchanged"
         for i in np.flatnonzero(chosen):
             log.add(
                 source, check, WARNING, action, hole=str(collars.names[stations.hole[i]]),
@@ -371,7 +371,7 @@ def checked_turns(stations: Stations, collars: Collars, source: str, log: Log) -
 
 
 def extrapolated(stations: Stations, ends: Floats, collars: Collars, source: str, log: Log) -> None:
-    """Name the holes that run straight on above their first station or below their last."""
+    """Report the holes extended straight above their first station or below their last."""
     count = np.bincount(stations.hole, minlength=len(collars))
     last = np.cumsum(count) - 1
     for k in np.flatnonzero(count):
@@ -379,19 +379,19 @@ def extrapolated(stations: Stations, ends: Floats, collars: Collars, source: str
         name, row = str(collars.names[k]), int(stations.row[last[k]])
         if ends[k] > bottom * (1 + _ROUNDING):
             log.add(
-                source, "hole runs below its last survey", NOTE, "straight on and marked",
+                source, "hole runs below its last survey", NOTE, "extended straight and marked",
                 hole=name, row=row, detail=f"{bottom:g} to {ends[k]:g}",
             )  # fmt: skip
         if top > 0:
             row = int(stations.row[last[k] - count[k] + 1])
             log.add(
-                source, "no survey at the collar", NOTE, "straight from there, and marked",
+                source, "no survey at the collar", NOTE, "extended straight and marked",
                 hole=name, row=row, detail=f"first at {top:g}",
             )  # fmt: skip
 
 
 def without_holes(collars: Collars, keep: Bools) -> Collars:
-    """Return some of the collars."""
+    """Return the collars to keep."""
     return replace(
         collars,
         names=collars.names[keep],
@@ -404,7 +404,7 @@ def without_holes(collars: Collars, keep: Bools) -> Collars:
 
 
 def _grave(hole: object, assayed: set[str]) -> Severity:
-    """Return how bad it is that a hole cannot be placed."""
+    """Return the severity of a hole that cannot be placed: an error if it has assays."""
     return ERROR if str(hole) in assayed else WARNING
 
 

@@ -13,30 +13,30 @@ from geounfold.geometry.mesh import Floats, Ints
 Residual = Literal["merge", "drop", "keep"]
 RESIDUALS = get_args(Residual)
 
-_MOST_PARTS = 5e7  # of intervals, cut by windows
-_SLIVER = 1e-9  # of the composite length: shorter overlaps come from rounding
+_MOST_PARTS = 5e7  # most parts of intervals after the cut by windows
+_SLIVER = 1e-9  # overlaps below this share of the composite length are rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompositeOptions:
-    """How intervals become composites.
+    """Rules by which intervals become composites.
 
     Parameters
     ----------
     length : float
-        Length along the hole, in the tables' unit. Composites begin at its whole multiples from
+        Length along the hole, in the tables' unit. Composites begin at whole multiples of it from
         the collar, so they do not depend on the depth at which sampling began.
     residual : {"merge", "drop", "keep"}
-        What becomes of the last composite of a hole if it is shorter than half the length:
-        joined to the one above (no metal is lost), left out, or kept.
+        Treatment of the last composite of a hole if it is shorter than half the length: joined
+        to the one above (no metal is lost), left out, or kept.
     min_coverage : float
-        Share of a composite's length that must be assayed; below it the grade is missing. A
+        Smallest assayed share of a composite's length; below it the grade is missing. A
         composite without any grade is left out.
 
     Raises
     ------
     OptionError
-        A value outside these.
+        A value is outside its valid range.
     """
 
     length: float
@@ -56,15 +56,15 @@ class Composites:
     Attributes
     ----------
     hole : (c,) int
-        Their holes.
+        Index of the hole of each composite.
     start, end : (c,) float
         Lengths along the hole.
     covered : (c,) float
-        Length that intervals cover, assayed or not.
+        Length covered by intervals, assayed or not.
     grades : (c, g) float
         Means weighted by assayed length; NaN below the minimum coverage.
     words : (c, w) object
-        Of each text column the value that covers most of the length.
+        Value of each text column that covers most of the length.
     """
 
     hole: Ints
@@ -88,20 +88,20 @@ def composite(
     Parameters
     ----------
     hole : (n,) int
-        The hole of each interval.
+        Index of the hole of each interval.
     start, end : (n,) float
         Lengths along the hole.
     grades : (n, g) float
-        NaN where not assayed: left out of the mean, never taken as zero.
+        Grades; NaN if not assayed, which the mean leaves out and never counts as zero.
     words : (n, w) object
-        Text columns; empty where missing.
+        Values of the text columns; empty if missing.
     options : CompositeOptions
         Length and rules.
 
     Raises
     ------
     OptionError
-        So short a length that there are over 50 million.
+        The length is so short that there are over 50 million parts.
     """
     window, interval, weight, lower = _parts(hole, start, end, options)
     keys, group = np.unique(np.column_stack([hole[interval], window]), axis=0, return_inverse=True)
@@ -136,7 +136,7 @@ def composite(
 def _parts(
     hole: Ints, start: Floats, end: Floats, options: CompositeOptions
 ) -> tuple[Ints, Ints, Floats, Floats]:
-    """Return the parts that windows cut intervals into: window, interval, length and lower end."""
+    """Cut intervals by windows; return each part's window, interval, length and lower end."""
     size = options.length
     if ((end - start) / size).sum() > _MOST_PARTS:
         raise OptionError(f"composites of {size:g} are too many to hold; take a greater length")
@@ -156,7 +156,7 @@ def _parts(
 
 
 def _merged(hole: Ints, window: Ints, lower: Floats, size: float) -> Ints:
-    """Return windows with each hole's last one, where short, joined to the one above it."""
+    """Return the windows; a short last window of a hole is joined to the one above it."""
     count = int(hole.max(initial=-1)) + 1
     last = np.full(count, -1, dtype=np.int64)
     np.maximum.at(last, hole, window)
@@ -170,7 +170,7 @@ def _merged(hole: Ints, window: Ints, lower: Floats, size: float) -> Ints:
 
 
 def _most(values: np.ndarray, group: Ints, weight: Floats, count: int) -> np.ndarray:
-    """Return for each group the text with most weight; of equal ones the first in the alphabet."""
+    """Return for each group the text of most weight; of equal ones, the first in the alphabet."""
     texts, code = np.unique(values.astype(str), return_inverse=True)
     pairs, index = np.unique(np.column_stack([group, code]), axis=0, return_inverse=True)
     sums = np.bincount(index.ravel(), weight)

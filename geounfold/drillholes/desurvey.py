@@ -1,4 +1,4 @@
-r"""Where holes run: minimum curvature.
+r"""Paths of holes by minimum curvature.
 
 Between two survey stations a hole is the circular arc that has the measured directions at its
 ends. With unit tangents t1 and t2, their angle (dogleg) beta and the length L along the hole
@@ -9,18 +9,18 @@ between them, the displacement is
 (Taylor and Mason 1972, *A systematic approach to well surveying calculations*, SPE Journal 12(6),
 474-488; Sawaryn and Thorogood 2005, *A compendium of directional calculations based on the
 minimum curvature method*, SPE Drilling & Completion 20(1), 24-36, equations 1 to 4). It is exact
-where the hole is a circular arc or straight. The tangent at the share f of the arc's length is
+if the hole is a circular arc or straight. The tangent at the share f of the arc's length is
 
     t(f) = (sin((1 - f) beta) t1 + sin(f beta) t2) / sin(beta)
 
-(ibid., interpolation), and as a part of an arc is an arc, the first equation gives the position
-there too.
+(ibid., interpolation). A part of an arc is an arc, so the first equation gives the position there
+too.
 
-Above the first station and below the last one a hole runs straight on; such positions are told
-apart. Why not a library: wellpathpy computes one well at a time, from inclinations and without
-tables or checks (its positions and these agree to 1e-12 over a sharply turning 4,100 m);
-welleng brings a planning suite, baselode geopandas and plotly; drillholes is at version 0.0. The
-equations above are all that would be taken from them.
+Above the first station and below the last one the path is extended straight, and such positions
+are marked. No library is used, because only the equations above would be needed of it: wellpathpy
+computes one well at a time, from inclinations and without tables or checks (its positions and
+these agree to 1e-12 over a sharply turning 4,100 m); welleng brings a planning suite, baselode
+geopandas and plotly; drillholes is at version 0.0.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
-_SMALL = 1e-4  # radians; there the series' next term is below 1e-27
+_SMALL = 1e-4  # radians; below it a series is used, whose next term is below 1e-27
 
 
 def directions(azimuth: Floats, dip: Floats) -> Floats:
@@ -83,7 +83,7 @@ def arc(length: Floats, before: Floats, after: Floats) -> Floats:
 def tangent_within(share: Floats, before: Floats, after: Floats) -> Floats:
     """Return unit tangents (n, 3) at shares (n,) of arcs' lengths."""
     beta = dogleg(before, after)
-    straight = beta < _SMALL  # there linear weights, normalised, are off by less than beta^3 / 20
+    straight = beta < _SMALL  # normalised linear weights are off by less than beta^3 / 20
     sine = np.where(straight, 1.0, np.sin(beta))
     a = np.where(straight, 1.0 - share, np.sin((1.0 - share) * beta) / sine)
     b = np.where(straight, share, np.sin(share * beta) / sine)
@@ -98,15 +98,15 @@ class Paths:
     Attributes
     ----------
     collars : (h, 3) float
-        Where they begin.
+        Coordinates of the collars.
     first : (h + 1,) int
         The stations of hole k are ``first[k]`` to ``first[k + 1] - 1``; each has one or more.
     depth : (s,) float
-        Length along the hole, rising within each.
+        Length along the hole, increasing within each hole.
     tangent : (s, 3) float
         Unit vectors down the hole.
     offset : (s, 3) float
-        Position from the collar.
+        Position relative to the collar.
     """
 
     collars: Floats
@@ -116,14 +116,14 @@ class Paths:
     offset: Floats
 
     def at(self, hole: Ints, depth: Floats) -> tuple[Floats, Bools]:
-        """Return positions (n, 3) at depths along holes, and whether surveys enclose them (n,).
+        """Return positions (n, 3) at depths along holes, and whether each is surveyed (n,).
 
         Parameters
         ----------
         hole : (n,) int
-            Which hole.
+            Index of the hole.
         depth : (n,) float
-            Length along it from the collar.
+            Length along the hole from the collar.
         """
         nearest = self._above(hole, depth)
         above = nearest >= self.first[hole]
@@ -134,13 +134,13 @@ class Paths:
         along = depth - self.depth[station]
         span = np.where(inside, self.depth[following] - self.depth[station], 1.0)
         share = np.where(inside, along / span, 0.0)
-        # Beyond the ends the share is 0: the tangent stays, and the way may be negative.
+        # Beyond the ends the share is 0: the tangent is constant and the length may be negative.
         moved = arc(along, before, tangent_within(share, before, after))
         enclosed = inside | (along == 0.0)
         return self.collars[hole] + (self.offset[station] + moved), enclosed
 
     def _above(self, hole: Ints, depth: Floats) -> Ints:
-        """Return the last station at or above each depth; one before the hole's first if none."""
+        """Return the last station at or above each depth; if none, the hole's first less one."""
         count = len(self.depth)
         owner = np.repeat(np.arange(len(self.collars)), np.diff(self.first))
         asked = np.repeat([0, 1], [count, len(depth)])
@@ -159,9 +159,9 @@ def desurvey(collars: Floats, hole: Ints, depth: Floats, tangent: Floats) -> Pat
     collars : (h, 3) float
         Collars of all holes.
     hole : (s,) int
-        The hole of each station, rising; every hole has one.
+        Index of the hole of each station, increasing; every hole has a station.
     depth : (s,) float
-        Length along the hole, rising within each.
+        Length along the hole, increasing within each hole.
     tangent : (s, 3) float
         Unit vectors down the hole, no two in succession opposite.
     """
@@ -169,7 +169,7 @@ def desurvey(collars: Floats, hole: Ints, depth: Floats, tangent: Floats) -> Pat
     offset = np.empty_like(tangent)
     offset[first[:-1]] = depth[first[:-1], None] * tangent[first[:-1]]
     step = arc(np.diff(depth), tangent[:-1], tangent[1:]) if len(depth) > 1 else tangent[:0]
-    # Station by station over all holes at once, so that no hole's sum depends on another's.
+    # Station by station over all holes at once, so that a hole's sum does not depend on others.
     for rank in range(1, int(np.diff(first).max(initial=1))):
         now = first[:-1][np.diff(first) > rank] + rank
         offset[now] = offset[now - 1] + step[now - 1]

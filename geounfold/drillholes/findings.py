@@ -1,4 +1,4 @@
-"""What the checks find: each finding names its table, hole and row, and what was done."""
+"""Findings of the checks: each names its table, hole, row and the action taken."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ _MOST_LISTED = 1000
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a check has found.
+    """One finding of a check.
 
     Attributes
     ----------
     source : str
-        The table: the file's name.
+        Name of the table's file.
     check : str
-        What is amiss, in the same words for every finding of its kind.
+        The problem, in the same words for every finding of its kind.
     severity : {"note", "warning", "error"}
-        A note says what was assumed; a warning that a row was left out, cut or taken otherwise
-        than it stands; an error that a hole with assays cannot be placed.
+        Note: an assumption. Warning: a row was left out, cut or changed. Error: a hole with
+        assays cannot be placed.
     action : str
-        What was done.
+        The action taken.
     hole : str
-        The hole; empty where the finding is about the table.
+        Name of the hole; empty if the finding is about the table.
     row : int
-        The data row (1 is the first after the header); 0 where it is about the hole.
+        Data row (1 is the first after the header); 0 if the finding is about the hole.
     detail : str
         The values concerned.
     """
@@ -49,7 +49,7 @@ class Finding:
 
     @property
     def where(self) -> str:
-        """Hole, row and values, as far as there are any."""
+        """Hole, row and values, as far as they are known."""
         row = f"data row {self.row}" if self.row else ""
         hole = f"hole {shown(self.hole)}" if self.hole else ""
         place = " ".join(part for part in (hole, row) if part)
@@ -62,7 +62,7 @@ class Finding:
 
 @dataclass
 class Log:
-    """Findings as the checks add them."""
+    """Collects the findings of the checks."""
 
     found: list[Finding] = field(default_factory=list)
 
@@ -82,7 +82,7 @@ class Log:
 
 
 def messages(findings: Iterable[Finding]) -> list[str]:
-    """Return one line for all findings of a kind, in the order of the first of each.
+    """Return one line for each kind of finding, in the order of their first findings.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def messages(findings: Iterable[Finding]) -> list[str]:
 
 
 def facts(findings: Sequence[Finding]) -> dict[str, Any]:
-    """Return findings for a summary: counts by kind, and each with its hole and row."""
+    """Return the findings for a summary: counts by kind, and each one's hole and row."""
     counts = [
         {
             "table": group[0].source,
@@ -129,7 +129,7 @@ def facts(findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def refusal(findings: Sequence[Finding], cure: str) -> str:
-    """Return the error that names the first of the findings and how many more there are."""
+    """Return an error message with the first finding and the number of the others."""
     first = findings[0]
     where = f": {first.where}" if first.where else ""
     more = f" (and {counted(len(findings) - 1, 'more finding')})" if len(findings) > 1 else ""
@@ -144,7 +144,7 @@ def _grouped(findings: Iterable[Finding]) -> dict[tuple[str, str, str, str], lis
 
 
 def _some(places: Sequence[str], most: int = 5) -> str:
-    """Return the first places and how many more there are.
+    """Return the first places and the number of the others.
 
     Examples
     --------

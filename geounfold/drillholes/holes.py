@@ -1,4 +1,4 @@
-"""Drill-holes read, checked and desurveyed; their samples and traces."""
+"""Read, check and desurvey drill-holes; return their samples and traces."""
 
 from __future__ import annotations
 
@@ -27,35 +27,35 @@ _MOST_TRACE_POINTS = 20_000_000
 
 @dataclass(frozen=True, eq=False)
 class DrillHoles:
-    """Drill-holes whose rows were checked and whose paths are known.
+    """Checked drill-holes with their paths.
 
     Attributes
     ----------
     sources : dict of str
-        The tables by kind: collar, survey, assay.
+        Names of the tables by kind: collar, survey, assay.
     collars : Collars
-        The holes that could be placed.
+        The h holes that could be placed.
     stations : Stations
-        Their surveys; dips positive down.
+        Survey stations of these holes; dips positive down.
     intervals : Intervals
-        Their assayed intervals.
+        The n assayed intervals of these holes.
     paths : Paths
-        Where they run.
+        Paths of these holes.
     ends : (h,) float
-        Depth to which each is drawn: of its last interval, its last survey, or the depth that
-        the collar table gives, whichever is deepest.
+        Depth of each hole's end: of its last interval, its last survey or the collar table,
+        whichever is deepest.
     grades : dict of (n,) float
-        Numbers of the intervals, by column; NaN where not assayed.
+        Numbers of the intervals, by column; NaN if not assayed.
     words : dict of (n,) object
         Other columns of the intervals.
     positive_down : bool
         The dip convention of the tables.
     stated : bool
-        Whether it was stated, else detected.
+        Whether the user stated the convention; else it was detected.
     rows : dict of int
-        Rows of the tables as read.
+        Number of rows of each table as read.
     findings : tuple of Finding
-        What was found and done.
+        Findings of the checks.
     """
 
     sources: Mapping[str, str]
@@ -91,7 +91,7 @@ class DrillHoles:
         Raises
         ------
         InputError
-            No such hole.
+            No placed hole has this name.
         """
         where = self.collars.find(np.array([hole], dtype=object))[0]
         if where < 0:
@@ -106,17 +106,17 @@ class DrillHoles:
         residual: Residual = "merge",
         min_coverage: float = 0.5,
     ) -> pd.DataFrame:
-        """Return the intervals, or composites of a length, with where their midpoints lie.
+        """Return the intervals, or composites of a length, with the coordinates of their midpoints.
 
         Parameters
         ----------
         length : float, optional
-            Composite to this length along the hole (see `CompositeOptions`, also for the rules
-            that follow); without, the intervals as they are.
+            Length of composites along the hole, in the tables' unit; the default is the intervals
+            as they are.
         residual : {"merge", "drop", "keep"}, optional
-            What becomes of a short last composite.
+            Treatment of a short last composite, as in `CompositeOptions`.
         min_coverage : float, optional
-            Share of a composite that must be assayed for a grade.
+            Smallest assayed share of a composite with a grade, as in `CompositeOptions`.
 
         Returns
         -------
@@ -124,15 +124,15 @@ class DrillHoles:
             Columns hole, from, to, x, y, z (of the midpoint along the hole, in the collars'
             coordinates), position (surveyed, or extrapolated beyond a hole's surveys), for
             composites coverage (share of the length that intervals cover), and the assay
-            table's other columns. A column called as one of these is prefixed by ``assay_``.
+            table's other columns. A column with one of these names gets the prefix ``assay_``.
             Sorted by hole, in the collar table's order, and depth.
 
         Raises
         ------
         OptionError
-            A length or rule outside its valid values.
+            A length or rule is outside its valid values.
         InputError
-            Nothing is assayed over enough of any composite.
+            No composite is assayed over enough of its length.
         """
         iv = self.intervals
         extra: dict[str, Any] = {}
@@ -175,8 +175,8 @@ class DrillHoles:
         Parameters
         ----------
         step : float, optional
-            Length between points, which lie at whole multiples of it, at every station and at
-            the end; the intervals' median length without.
+            Length between points, in the tables' unit. Points lie at its whole multiples, at
+            every station and at the end. The default is the median length of the intervals.
 
         Returns
         -------
@@ -186,7 +186,7 @@ class DrillHoles:
         Raises
         ------
         OptionError
-            A step that is not above 0, or more than 20 million points.
+            The step is not above 0, or gives more than 20 million points.
         """
         if step is None:
             step = float(np.median(self.intervals.end - self.intervals.start))
@@ -195,7 +195,7 @@ class DrillHoles:
         share = np.floor(self.ends / step)
         if share.sum() > _MOST_TRACE_POINTS:
             raise OptionError(
-                f"a step of {step:g} makes {share.sum():.3g} trace points; enlarge it"
+                f"a step of {step:g} makes {share.sum():.3g} trace points; take a larger one"
             )
         count = share.astype(np.int64) + 1
         owner = np.repeat(np.arange(len(self)), count)
@@ -223,7 +223,7 @@ class DrillHoles:
         return messages(self.findings)
 
     def facts(self) -> dict[str, Any]:
-        """Return what was read and found, for a summary."""
+        """Return the counts of rows, holes and findings, for a summary."""
         return {
             "files": dict(self.sources),
             "rows": dict(self.rows),
@@ -253,30 +253,30 @@ def read_drillholes(
     Parameters
     ----------
     collar, survey, assay : path or DataFrame
-        Where holes begin (hole, x, y, z; depth, azimuth and dip where there are), which way they
-        run (hole, at, azimuth, dip; degrees), what was measured (hole, from, to and any others).
-        All lengths in one unit; azimuths clockwise from y. Columns are found by name in any
-        letter case (`ALIASES`).
+        Collars (hole, x, y, z; optionally depth, azimuth, dip), surveys (hole, at, azimuth, dip)
+        and assays (hole, from, to and any others). All lengths have one unit. Angles are in
+        degrees, azimuths clockwise from y. Columns are found by name in any letter case
+        (`ALIASES`).
     columns : dict of str, optional
-        Names of columns by field (hole, x, y, z, depth, at, azimuth, dip, from, to) where they
-        are not found.
+        Names of columns by field (hole, x, y, z, depth, at, azimuth, dip, from, to), for columns
+        that `ALIASES` does not find.
     grades : names, optional
-        The assay table's columns to be averaged as numbers; all columns of numbers without.
+        Columns of the assay table to average as numbers; the default is all columns of numbers.
     dip_positive_down : bool, optional
-        Whether dips point down where positive. Without, taken from their sign, as holes go down
-        as a rule, and reported.
+        Whether positive dips point down. The default is taken from the dips' sign, because most
+        holes go down, and reported.
     strict : bool, optional
-        Refuse where any row is left out, cut or taken otherwise than it stands.
+        Raise if any row is left out, cut or changed.
     drop_invalid : bool, optional
-        Go on without the holes that have assays but cannot be placed: no collar, two collars,
-        no survey.
+        Leave out the holes that have assays but cannot be placed (no collar, two collars, no
+        survey) instead of raising.
 
     Raises
     ------
     InputError
-        A table that cannot be read, columns missing or ambiguous, nothing left, dips of both
-        signs without a convention stated, a hole that cannot be placed (without `drop_invalid`),
-        any finding but notes (with `strict`).
+        A table cannot be read, a column is missing or ambiguous, no row is left, dips have both
+        signs and no convention is stated, a hole cannot be placed (without `drop_invalid`), or
+        there is a finding other than notes (with `strict`).
 
     Examples
     --------
@@ -332,7 +332,7 @@ def read_drillholes(
 def _check_left(
     stations: Stations, intervals: Intervals, tables: Mapping[str, HoleTable], log: Log
 ) -> None:
-    """Raise where no hole has both a survey and an interval."""
+    """Raise if no hole has both a survey and an interval."""
     if not np.intersect1d(stations.hole, intervals.hole).size:
         why = (
             refusal([f for f in log.found if f.severity != NOTE] or log.found, "correct the tables")
@@ -354,7 +354,7 @@ def _turned(stations: Stations, down: bool) -> Stations:
 def _placed(
     collars: Collars, stations: Stations, intervals: Intervals
 ) -> tuple[Collars, Stations, Intervals]:
-    """Return only holes that have a direction, numbered anew."""
+    """Return only the holes that have a direction, renumbered."""
     keep = np.zeros(len(collars), dtype=bool)
     keep[stations.hole] = True
     number = np.cumsum(keep) - 1
@@ -367,7 +367,7 @@ def _placed(
 
 
 def _ends(collars: Collars, stations: Stations, intervals: Intervals) -> Floats:
-    """Return how deep each hole is known to go."""
+    """Return the greatest known depth of each hole."""
     ends = np.where(np.isfinite(collars.depth), collars.depth, 0.0)
     np.maximum.at(ends, stations.hole, stations.depth)
     np.maximum.at(ends, intervals.hole, intervals.end)
@@ -375,15 +375,13 @@ def _ends(collars: Collars, stations: Stations, intervals: Intervals) -> Floats:
 
 
 def _refuse(findings: Sequence[Finding], *, strict: bool, drop_invalid: bool) -> None:
-    """Raise on holes that cannot be placed, and with `strict` on anything but notes."""
+    """Raise on holes that cannot be placed and, with `strict`, on any finding except notes."""
     grave = [f for f in findings if f.severity == ERROR]
     if grave and not drop_invalid:
-        raise InputError(
-            refusal(grave, "correct it, or go on without such holes by --drop-invalid")
-        )
+        raise InputError(refusal(grave, "correct it, or leave such holes out by --drop-invalid"))
     other = [f for f in findings if f.severity != NOTE]
     if other and strict:
-        raise InputError(refusal(other, "correct it, or go on without --strict"))
+        raise InputError(refusal(other, "correct it, or run without --strict"))
 
 
 def _stacked(columns: Mapping[str, np.ndarray], rows: int, kind: Any) -> np.ndarray:

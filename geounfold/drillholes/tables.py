@@ -1,4 +1,4 @@
-"""The three tables of drill-holes: their columns found by name, their values as numbers."""
+"""Read the three drill-hole tables: find columns by name and convert values to numbers."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _HOLE = (
 _AZIMUTH = ("az", "azi", "azim", "azimuth", "bearing", "brg", "azgrid", "azimuthgrid")
 _DIP = ("dip", "dipangle", "plunge")
 
-# Spelled without case, spaces, underscores and units, as for coordinates. Inclination is no
-# dip: it is counted from the vertical in one trade and from the horizontal in the other.
+# Spelled without case, spaces, underscores and units, as for coordinates. Inclination is left out:
+# some trades count it from the vertical, others from the horizontal.
 ALIASES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "collar": {
         HOLE: _HOLE,
@@ -60,22 +60,22 @@ _OPTIONAL = {"collar": {"depth", "azimuth", "dip"}, "survey": set[str](), "assay
 
 @dataclass(frozen=True, eq=False)
 class HoleTable:
-    """One of the three tables, its columns found.
+    """One of the three tables, with its columns identified.
 
     Attributes
     ----------
     source : str
-        The file, as it was named; else collar, survey or assay.
+        Path of the file as given; else collar, survey or assay.
     hole : (n,) object
-        Names of holes as text without blanks around; empty where missing.
+        Names of the holes as text without surrounding blanks; empty if missing.
     numbers : dict of (n,) float
-        By field; NaN where missing or no number.
+        Values by field; NaN if missing or not a number.
     rest : DataFrame, n rows
-        All other columns as they are, numbered where two are called alike.
+        All other columns unchanged; a number is added to repeated names.
     row : (n,) int
-        Data rows in the file, 1 for the first.
+        Data rows in the file, from 1.
     names : tuple of str
-        All columns.
+        Names of all columns.
     """
 
     source: str
@@ -89,7 +89,7 @@ class HoleTable:
         return len(self.hole)
 
     def kept(self, keep: Bools) -> HoleTable:
-        """Return the table with some of its rows."""
+        """Return the table with the rows to keep."""
         if keep.all():
             return self
         return HoleTable(
@@ -110,19 +110,19 @@ def read_hole_table(
     Parameters
     ----------
     kind : {"collar", "survey", "assay"}
-        Which one.
+        Kind of table.
     given : path or DataFrame
-        A table that io reads, or one at hand.
+        File in a format that `geounfold.io.tables` reads, or the table itself.
     columns : dict of str
-        Names of columns by field, where they are not found by `ALIASES`; fields of other tables
-        are passed over.
+        Names of columns by field, for columns that `ALIASES` does not find; fields of other
+        tables are ignored.
     log : Log
-        Takes the findings.
+        Collects the findings.
 
     Raises
     ------
     InputError
-        No such file, a column that is missing or ambiguous, or no row with a hole's name.
+        The file does not exist, a column is missing or ambiguous, or no row names a hole.
     """
     if isinstance(given, pd.DataFrame):
         source, table = f"the {kind} table", Table(given.reset_index(drop=True), text=False)
@@ -144,7 +144,7 @@ def read_hole_table(
         values[field] = np.where(wrong, np.nan, read)
         for i in np.flatnonzero(wrong):
             log.add(
-                source, f"{field} is no number, or too large", WARNING, "taken as missing",
+                source, f"{field} is not a number, or too large", WARNING, "taken as missing",
                 hole=str(hole[i]), row=int(row[i]), detail=f"'{shown(column.iloc[i])}'",
             )  # fmt: skip
     rest = table.frame.iloc[:, [i for i in range(len(names)) if i not in where.values()]]
@@ -159,7 +159,7 @@ def read_hole_table(
 
 
 def _fields(kind: str, names: list[str], columns: Mapping[str, str], source: str) -> dict[str, int]:
-    """Return where each field's column is."""
+    """Return the position of each field's column."""
     plain = [plain_name(name) for name in names]
     where: dict[str, int] = {}
     for field, aliases in ALIASES[kind].items():
@@ -187,7 +187,7 @@ def _fields(kind: str, names: list[str], columns: Mapping[str, str], source: str
 
 
 def check_fields(columns: Mapping[str, str], tables: Mapping[str, HoleTable]) -> None:
-    """Raise OptionError where a field is named that no table has, or a column that is not there."""
+    """Raise OptionError if a given field belongs to no table, or a given column does not exist."""
     for field, name in columns.items():
         homes = [kind for kind, fields in ALIASES.items() if field in fields]
         if not homes:
@@ -201,7 +201,7 @@ def check_fields(columns: Mapping[str, str], tables: Mapping[str, HoleTable]) ->
 
 
 def _hole_names(column: pd.Series) -> np.ndarray:
-    """Return names as text: 34873.0, as a spreadsheet's blanks make it, is 34873."""
+    """Return names as text; 34873.0, which a spreadsheet with blanks yields, becomes 34873."""
     values = objects(column)
     whole = [
         int(v) if isinstance(v, float) and np.isfinite(v) and v == int(v) else v for v in values
@@ -212,24 +212,24 @@ def _hole_names(column: pd.Series) -> np.ndarray:
 def grade_columns(
     table: HoleTable, chosen: tuple[str, ...] | None, log: Log
 ) -> tuple[dict[str, Floats], dict[str, np.ndarray]]:
-    """Return the assay table's other columns: numbers to be averaged, and text to be carried.
+    """Return the assay table's other columns: numbers to average, and text.
 
-    A column is one of numbers where at least half of the values that are there are numbers;
-    the others are findings and taken as missing, never as zero.
+    A column is numeric if at least half of its non-empty values are numbers. The other values
+    become findings and count as missing, never as zero.
 
     Parameters
     ----------
     table : HoleTable
-        Assays.
+        The assay table.
     chosen : names, optional
-        The columns to take as numbers; without, all that are.
+        Columns to read as numbers; the default is all numeric columns.
     log : Log
-        Takes the findings.
+        Collects the findings.
 
     Raises
     ------
     OptionError
-        A chosen column is not there.
+        A chosen column does not exist.
     """
     names = [str(name) for name in table.rest.columns]
     for name in chosen or ():
@@ -257,12 +257,12 @@ def _log_grades(
 ) -> None:
     for i in np.flatnonzero(wrong):
         log.add(
-            table.source, f"{column.name} is no number", WARNING, "taken as not assayed",
+            table.source, f"{column.name} is not a number", WARNING, "taken as not assayed",
             hole=str(table.hole[i]), row=int(table.row[i]), detail=f"'{shown(column.iloc[i])}'",
         )  # fmt: skip
     for i in np.flatnonzero(values < 0):
         log.add(
             table.source, f"{column.name} is negative, perhaps a code", WARNING,
-            "kept as it stands", hole=str(table.hole[i]), row=int(table.row[i]),
+            "kept unchanged", hole=str(table.hole[i]), row=int(table.row[i]),
             detail=f"{values[i]:g}",
         )  # fmt: skip

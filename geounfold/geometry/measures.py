@@ -1,6 +1,6 @@
 """Lengths, areas, volumes, normals and edges, on plain arrays.
 
-Signs are kept: a volume or an area is negative where an element is turned inside out.
+Signs are kept: a volume or an area is negative if an element is turned inside out.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def enclosed_volume(V: Floats, F: Ints) -> float:
 
 
 def tet_volumes(V: Floats, T: Ints) -> Floats:
-    """Return the signed volume of each tetrahedron, (m,); negative where inverted.
+    """Return the signed volume of each tetrahedron, (m,); negative if inverted.
 
     >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> (6 * tet_volumes(corner, np.array([[0, 1, 2, 3], [1, 0, 2, 3]]))).round(12).tolist()
@@ -178,7 +178,7 @@ def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
 def bilateral_normals(mesh: TriMesh, adjacency: Ints, sweeps: int, width: float = 0.12) -> Floats:
     """Return face normals smoothed without blunting creases, (m, 3).
 
-    A neighbour's weight has fallen to 1/e where 1 - cosine is ``width``.
+    A neighbour's weight is 1/e if 1 - cosine is ``width``.
     """
     N = face_normals(mesh.V, mesh.F)
     area = 2 * triangle_areas(mesh.V, mesh.F)

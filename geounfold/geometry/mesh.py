@@ -19,7 +19,7 @@ Numbers = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 Space = Literal["folded", "unfolded"]
-"""Which side of the map."""
+"""The two spaces of the map."""
 
 _T = TypeVar("_T")
 
@@ -30,7 +30,7 @@ def in_space(space: Space, folded: _T, unfolded: _T) -> tuple[_T, _T, Space]:
     Raises
     ------
     OptionError
-        Neither folded nor unfolded.
+        The space is neither folded nor unfolded.
     """
     if space == "folded":
         return folded, unfolded, "unfolded"
@@ -42,7 +42,7 @@ def in_space(space: Space, folded: _T, unfolded: _T) -> tuple[_T, _T, Space]:
 def _checked(
     vertices: Floats, cells: Ints, corners: int, kind: str, dims: tuple[int, ...]
 ) -> tuple[Floats, Ints]:
-    """Read-only copies of a mesh's arrays, or MeshError saying what is wrong."""
+    """Return read-only copies of a mesh's arrays, or raise MeshError with the fault."""
     V = np.array(vertices, dtype=np.float64, order="C")
     C = np.array(cells, dtype=np.int64, order="C")
     if V.ndim != 2 or V.shape[1] not in dims:
@@ -118,7 +118,7 @@ class TetMesh:
     V : (n, 3) float
         Vertices, in any length unit.
     T : (m, 4) int
-        Tetrahedra; right-handed (positive volume) where not inverted.
+        Tetrahedra; right-handed (positive volume) if not inverted.
 
     Raises
     ------

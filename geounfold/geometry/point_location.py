@@ -1,10 +1,10 @@
-"""Point location in tetrahedra: a walk from a near one, for many points at once.
+"""Point location in tetrahedra: a walk from a near one, for many points at a time.
 
-Every point starts in a tetrahedron found by a grid, and goes through the face it lies farthest
-beyond until none is left to cross.  Most points are there after one or two steps, each a few
-multiplications for thousands of points at once.  Whatever the walk does not place (it leaves
-through the border, as at a fold's inner side, or does not end) libigl places, which is the
-reference: the answer is libigl's, but for points on a face, where either side is right.
+The walk of every point starts in a tetrahedron found by a grid. It crosses the face beyond which
+the point lies farthest, until there is none. Most walks take one or two steps, each a few
+multiplications for thousands of points at a time. libigl locates the points whose walk leaves
+through the border (as at a fold's inner side) or does not end. libigl is the reference: the
+answers agree, except for points on a face, for which either side is right.
 
 A point's answer depends on the point and the tetrahedra alone, whatever points come with it.
 """
@@ -16,12 +16,12 @@ import numpy as np
 from geounfold.geometry.mesh import Floats, Ints, Numbers
 
 ON_FACE = 1e-12
-"""A barycentric coordinate above minus this counts as not negative: rounding on a face."""
+"""Rounding on a face: a barycentric coordinate above minus this counts as not negative."""
 
 STEPS = 24
-"""Tetrahedra that a walk crosses at most."""
+"""Most tetrahedra that a walk crosses."""
 
-CELLS = 1 << 22  # of the grid, at most
+CELLS = 1 << 22  # most cells of the grid
 _PER_CELL = 1.5  # tetrahedra in a grid's cell, in the mean over those that hold any
 _GROWTH = 2  # cells by which the grid's tetrahedra are spread into empty ones
 
@@ -31,7 +31,7 @@ Columns = tuple[Floats, Floats, Floats]
 
 
 class TetWalk:
-    """Tetrahedra made ready for point location.
+    """Tetrahedra indexed for point location.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class TetWalk:
         self._grid = _Grid(V, T)
 
     def locate(self, x: Floats, y: Floats, z: Floats) -> tuple[Numbers, Floats]:
-        """Return the tetrahedron of each point, (k,), -1 where the walk found none.
+        """Return the tetrahedron of each point, (k,), -1 if the walk found none.
 
         Also the barycentric coordinates of the second to fourth corner, (3, k), 0 where
         it found none.
@@ -121,7 +121,7 @@ def _inverse_edges(V: Floats, T: Ints) -> Floats:
     a, b, c = (V[T[:, k]] - V[T[:, 0]] for k in (1, 2, 3))
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     volume = np.einsum("ij,ij->i", a, bc)
-    volume[volume == 0] = np.nan  # which no comparison finds anything in
+    volume[volume == 0] = np.nan  # NaN fails every comparison, so a flat one holds no point
     out: Floats = np.concatenate([bc.T, ca.T, ab.T]) / volume
     return out
 
@@ -154,7 +154,7 @@ class _Grid:
         self._low, self._size_inverse = low - _GROWTH * size, 1.0 / size
         self._shape = np.floor((high - self._low) / size).astype(np.int32) + 1 + _GROWTH
         grid = np.full(int(np.prod(self._shape, dtype=np.int64)), -1, dtype=np.int32)
-        # The last written stays: corners first, so that middles go before them.
+        # The last write to a cell is kept: corners first, so that middles override them.
         for k in range(4):
             grid[self._cell(*V[T[:, k]].T)] = np.arange(len(T), dtype=np.int32)
         grid[self._cell(*middle.T)] = np.arange(len(T), dtype=np.int32)

@@ -26,7 +26,7 @@ def prism_tets(F: Ints, n: int, layers: int) -> Ints:
     Returns
     -------
     (3 m (layers - 1), 4) int
-        Right-handed tetrahedra wherever the prisms are upright; layer by layer.
+        Tetrahedra, layer by layer; right-handed if the prisms are upright.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def whole_prisms(T: Ints) -> tuple[Ints, Ints]:
 
 
 def _matching(wanted: Ints, offered: Ints) -> Ints:
-    """Return the first row of (m, 3) that equals each wanted row (k, 3), -1 where none does."""
+    """Return the first row of (m, 3) that equals each wanted row (k, 3); -1 if none does."""
     both = np.concatenate([offered, wanted])
     key = np.zeros(len(both), np.int64)
     for column in both.T:  # numbered anew by every column: no product of three numbers overflows

@@ -75,9 +75,9 @@ def rotation_from_angles(bearing: float, plunge: float, dip: float) -> Floats:
     Parameters
     ----------
     bearing : float
-        Of the y axis, degrees clockwise from north (world +y).
+        Direction of the y axis, degrees clockwise from north (world +y).
     plunge : float
-        Of the y axis, degrees below the horizontal.
+        Slope of the y axis, degrees below the horizontal.
     dip : float
         Degrees by which the x axis then turns downwards about the y axis.
 

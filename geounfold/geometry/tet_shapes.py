@@ -23,7 +23,7 @@ def dihedral_angles(V: Floats, T: Ints) -> Floats:
     """Return the six dihedral angles of each tetrahedron, degrees, (m, 6).
 
     The k-th is between the faces opposite to the corners of the k-th of the pairs 01, 02, 03, 12,
-    13, 23.  All are 70.53 where it is regular; 0 or 180 where it is flat.
+    13, 23.  All are 70.53 if it is regular, and 0 or 180 if it is flat.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def dihedral_angles(V: Floats, T: Ints) -> Floats:
 def radius_ratios(V: Floats, T: Ints) -> Floats:
     """Return three times the inscribed over the circumscribed sphere's radius, (m,).
 
-    1 where a tetrahedron is regular, 0 where it is flat, negative where it is inverted.
+    1 if a tetrahedron is regular, 0 if it is flat, negative if it is inverted.
 
     Inscribed: r = 3 v / (sum of the faces' areas).  Circumscribed: R = |a² (b x c) + b² (c x a)
     + c² (a x b)| / (12 v), a, b, c the edges from one corner and v the volume.

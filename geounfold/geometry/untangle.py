@@ -6,7 +6,7 @@ code", 2021 (arXiv 2102.03069): with J the deformation of a tetrahedron from its
 
     |J|^2 / chi(det J)^(2/3) + (1 + det(J)^2) / chi(det J)
 
-is finite for inverted elements as long as eps > 0; it is minimised again and again while eps goes
+is finite for inverted elements as long as eps > 0; it is minimised repeatedly while eps goes
 to zero with the worst determinant, after which no element can invert any more.
 """
 
@@ -24,7 +24,7 @@ _ROUNDS = 10  # values of eps
 _STEPS = 50  # L-BFGS steps for each
 _RINGS = (1, 2, 4)  # neighbourhoods of the bad elements that are freed, one after the other
 _SOUND = 1e-3  # determinant from which an element counts as upright
-_LEAST = 1e-6  # eps where nothing is inverted
+_LEAST = 1e-6  # eps if nothing is inverted
 
 
 def untangle(V: Floats, T: Ints, rest: Floats, bad: Ints) -> Floats:
@@ -38,7 +38,7 @@ def untangle(V: Floats, T: Ints, rest: Floats, bad: Ints) -> Floats:
         Tetrahedra, right-handed where upright.
     rest : (n, 3) float
         Vertices of the shapes that elements should have: the other space's.  A tetrahedron
-        that is not upright there shall be regular, of the median volume.
+        that is not upright there has a regular rest shape, of the median volume.
     bad : (k,) int
         Vertices of the elements at fault.
 
@@ -122,7 +122,7 @@ class _Problem:
         cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         det = np.einsum("ij,ij->i", a, cofactor[:, 0])
         root = np.sqrt(eps * eps + det * det)
-        # The plain formula cancels where det is far below zero.
+        # The plain formula cancels if det is far below zero.
         chi = np.where(det > 0, (det + root) / 2, eps * eps / (2 * (root - det)))
         slope = chi / root
         square = np.einsum("ijk,ijk->i", K, K)

@@ -1,4 +1,4 @@
-"""Points that a map carried, and points that it brought back."""
+"""Points carried by a map, and the distances of their round trip."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ class Carried:
     Attributes
     ----------
     points : (n, 3) float
-        Their images; NaN where the point lies beyond the map's reach.
+        Images of the points; NaN if a point lies beyond the map's reach.
     stratigraphic : (n,) float
-        0 at the bottom surface, 1 at the top; NaN where there is no image.
+        0 at the bottom surface, 1 at the top; NaN if there is no image.
     inside : (n,) bool
-        Whether the control mesh holds the point.
+        Whether the point lies in the control mesh.
     placed : (n,) bool
         Whether the point has an image: inside, or within the map's reach.
     element : (n,) int
-        The tetrahedron that carried each point: of the control mesh, from
-        ``len(control.folded.T)`` on of the shell around it; -1 where there is no image.
+        Tetrahedron that carried each point; -1 if there is no image. Indices from
+        ``len(control.folded.T)`` on are those of the shell.
     distance : (n,) float
-        From the control mesh, in the space the points were given in and their unit; 0 inside.
+        Distance from the control mesh, in the points' space and unit; 0 inside.
     unsolved : int
-        Points in a prism for which no image was found: its coordinates have no closed inverse.
-        They have none, then, and are not placed; always 0 with the coordinates of tetrahedra.
+        Number of points in a prism for which Newton's method found no image; they are not
+        placed. Always 0 with the coordinates of tetrahedra.
     """
 
     points: Floats
@@ -68,7 +68,7 @@ class Carried:
         return out
 
     def part(self, rows: slice) -> Carried:
-        """Return what became of some of the points."""
+        """Return the results of some of the points."""
         return Carried(
             self.points[rows],
             self.stratigraphic[rows],
@@ -81,14 +81,14 @@ class Carried:
 
 @dataclass(frozen=True, eq=False)
 class Returned:
-    """How points came back.
+    """Round trip of points through the map and its inverse.
 
     Attributes
     ----------
     largest : float
-        Largest distance between a point and its return, over those that have both; else 0.
+        Largest distance between a point and its return; 0 if no point returns.
     lost : (n,) bool
-        Points that did not come back though the mesh holds their image: no inverse was found.
+        Whether the image lies in the mesh, but no inverse was found.
     """
 
     largest: float

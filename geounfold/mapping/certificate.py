@@ -14,8 +14,8 @@ when
 
 Where both spaces are embeddings, the map from one to the other is one-to-one, and so is its
 inverse.  Orientations and intersections are decided by exact predicates (Shewchuk's, in libigl) on
-the very numbers that carry points.  Positive volumes alone prove nothing: around an inner hinge
-the tetrahedra of a column may wind past their neighbours' neighbours, upright every one.
+the very numbers that carry points.  Positive volumes alone are no proof: around an inner hinge the
+tetrahedra of a column may all be upright and yet overlap others two columns away.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ THEOREM = (
     "piecewise linear map between them is one-to-one"
 )
 
-_NAMED = 50  # flaws that a certificate lists one by one
+_NAMED = 50  # most flaws that a certificate lists one by one
 
 
 @dataclass(frozen=True, eq=False)
 class Gluing:
-    """How tetrahedra are glued together: their boundary, whatever the vertices' places.
+    """The gluing of tetrahedra and their boundary, independent of coordinates.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Gluing:
 
 @dataclass(frozen=True, eq=False)
 class SpaceFlaws:
-    """What keeps one space of a control mesh from being proved.
+    """Flaws that prevent the proof in one space of a control mesh.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class SpaceFlaws:
     crossing : (c, 2) int
         Pairs of boundary faces that intersect.
     nested : (p,) int
-        Parts of the boundary that lie inside out within others; looked for only where the
+        Parts of the boundary that lie inside out within others; searched only if the
         boundary does not intersect itself.
     """
 
@@ -152,14 +152,14 @@ def _nested(V: Floats, gluing: Gluing) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Mapping[str, Any]):
-    """What was proved of a control mesh; its entries by name, or as a mapping.
+    """Result of the proof for a control mesh; also a mapping of its entries.
 
     Attributes
     ----------
     injective : bool
         True only when all conditions of the theorem hold in both spaces: the map is one-to-one.
     tetrahedra, boundary_faces : int
-        How many were checked, those of the shell around the body included.
+        Numbers checked, including those of the shell around the body.
     glued : bool
         Condition 1: tetrahedra glued face to face, boundary a closed manifold.
     inverted_folded, inverted_unfolded : int
@@ -169,14 +169,13 @@ class Certificate(Mapping[str, Any]):
     nested_folded, nested_unfolded : int
         Condition 4: parts of the boundary inside out within others.
     elements : (k,) int
-        Tetrahedra at fault; first those of the body, from ``len(control.folded.T)`` on those of
-        the shell.
+        Tetrahedra at fault; indices from ``len(control.folded.T)`` on are those of the shell.
     blocks : (k,) int
-        Blocks that each of them holds.
+        Number of blocks in each of them.
     folded, unfolded : (k, 3) float
-        Their middles, in the coordinates given.
+        Their centres, in the coordinates given.
     reason : str
-        Why nothing could be checked; empty where something was.
+        Reason why nothing could be checked; empty if the mesh was checked.
     """
 
     injective: bool
@@ -197,7 +196,7 @@ class Certificate(Mapping[str, Any]):
 
     @classmethod
     def unproved(cls, reason: str) -> Certificate:
-        """Return the certificate of a map of which nothing can be checked, and why not."""
+        """Return the certificate of a map that cannot be checked, with the reason."""
         none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
         return cls(
             injective=False,
@@ -219,7 +218,7 @@ class Certificate(Mapping[str, Any]):
 
     @property
     def faults(self) -> list[str]:
-        """What is wrong, a phrase for each condition that fails."""
+        """The failed conditions, one phrase each."""
         if self.reason:
             return [self.reason]
         phrases = {
@@ -268,7 +267,7 @@ class Certificate(Mapping[str, Any]):
 
 
 def certify(control: ControlMesh, shell: ControlMesh | None, held: Ints) -> Certificate:
-    """Return the certificate of a control mesh, with the shell around it where there is one.
+    """Return the certificate of a control mesh and, if given, the shell around it.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ class ControlMesh:
     Attributes
     ----------
     folded, unfolded : TetMesh
-        The same tetrahedra; right-handed in both spaces where not inverted.  Unfolded z is
+        The same tetrahedra; right-handed in both spaces if not inverted.  Unfolded z is
         the stratigraphic coordinate: up is the top (hanging-wall) side, true thickness.
     stratigraphic : (n,) float
         0 on the bottom surface, 1 on the top, linear between, per vertex.
@@ -56,22 +56,22 @@ class ControlMesh:
 
 
 DATUMS = ("mid", "top", "bottom", "proportional")
-"""Which surface is flat in the unfolded space; ``proportional``: top and bottom both."""
+"""Surface that is flat in the unfolded space; ``proportional``: both top and bottom."""
 
 
 @dataclass(frozen=True)
 class Datum:
-    """How heights over the flat mid surface become unfolded z.
+    """Conversion of heights over the flat mid surface to unfolded z.
 
-    ``top`` and ``bottom`` shear the flat space vertically, so that every volume and every
-    thickness stays; ``proportional`` also scales thicknesses to their mean.
+    ``top`` and ``bottom`` shear the flat space vertically, which keeps every volume and every
+    thickness; ``proportional`` also scales thicknesses to their mean.
 
     Attributes
     ----------
     name : str
         One of DATUMS.
     bottom, top : float
-        Mean height of bottom and top, which the flat ones come to lie at.
+        Mean height of bottom and top, at which the flat surfaces lie.
 
     Raises
     ------
@@ -106,9 +106,9 @@ def side_by_side(
     Parameters
     ----------
     parts : sequence of (ControlMesh, ControlMesh or None)
-        Each with its shell, whose first vertices are the control mesh's.
+        Control meshes with their shells. A shell's first vertices are the control mesh's.
     gap : float
-        Distance left between them.
+        Distance between the meshes, in working units.
     """
     if len(parts) == 1:
         return parts[0]
@@ -137,7 +137,7 @@ def side_by_side(
 
 
 def _from_table(table: Floats, T: Ints) -> ControlMesh:
-    """Return a control mesh from rows of folded and unfolded places and the third coordinate."""
+    """Return a control mesh from rows of folded, unfolded and stratigraphic coordinates."""
     return ControlMesh(TetMesh(table[:, :3], T), TetMesh(table[:, 3:6], T), table[:, 6])
 
 

@@ -1,4 +1,4 @@
-"""What a control mesh does to lengths, areas, volumes and layers.
+"""Changes of lengths, areas, volumes and layers by a control mesh.
 
 Ratios are unfolded over folded, so that 1 is no change.  Signs are kept: a volume ratio is negative
 where an element is turned inside out.
@@ -16,7 +16,7 @@ from geounfold.geometry.measures import lengths, sorted_distinct
 from geounfold.geometry.mesh import Floats, Ints, TetMesh
 from geounfold.mapping.control_mesh import ControlMesh
 
-_SLICE = 1 << 12  # tetrahedra at once
+_SLICE = 1 << 12  # tetrahedra at a time
 
 
 def deformation_gradients(control: ControlMesh, elements: Ints | None = None) -> Floats:
@@ -27,13 +27,13 @@ def deformation_gradients(control: ControlMesh, elements: Ints | None = None) ->
     control : ControlMesh
         The tetrahedra in both spaces.
     elements : (m,) int, optional
-        The tetrahedra wanted; all by default.
+        Indices of tetrahedra; the default is all.
 
     Returns
     -------
     (m, 3, 3) float
         J such that an edge e of the folded tetrahedron is J e when unfolded; dimensionless.
-        det J is negative where just one of the two is inverted.
+        det J is negative if exactly one of the two is inverted.
 
     Raises
     ------
@@ -57,12 +57,12 @@ def _edge_matrices(V: Floats, T: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """What deformation gradients J do to volumes, lengths and layers, (m,) each.
+    """Changes of volumes, lengths and layers by deformation gradients J, (m,) each.
 
     Attributes
     ----------
     volume_ratio : (m,) float
-        det J: unfolded over folded volume; negative where turned inside out.
+        det J: unfolded over folded volume; negative if turned inside out.
     stretch_min, stretch_max : (m,) float
         Smallest and largest singular value of J: principal stretches.
     shear : (m,) float
@@ -135,7 +135,7 @@ def tet_edges(T: Ints) -> Ints:
 
 
 def edge_change(folded: TetMesh, unfolded: TetMesh) -> Floats:
-    """Return the relative change of length of each edge, (k,): positive where it grew.
+    """Return the relative change of length of each edge, (k,); positive if it grew.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""The file that keeps a map: named arrays in a zip archive, checked before they are believed.
+"""The map file: named arrays in a zip archive, checked before use.
 
 The archive holds one .npy member for each entry of ARRAYS, the format's name and version, and
-a checksum over all of them. ``numpy.load`` opens it too, but it is read here member by member:
-the sizes in the archive's directory are looked at before anything is unpacked, a member's header
-is matched against the one form that numpy writes, and numbers are taken from bytes as they are.
+a checksum over all of them. ``numpy.load`` also opens it, but this module reads each member
+itself. It checks the sizes in the archive's directory before it unpacks anything, matches each
+header against the one form that numpy writes, and takes numbers directly from the bytes.
 Nothing in the file is evaluated, unpickled or unpacked onto the disk.
 """
 
@@ -33,7 +33,7 @@ from geounfold.errors import InputError
 FORMAT = "geounfold-map"
 FORMAT_VERSION = 3
 OLDEST = 2
-"""First of the versions that can be read."""
+"""Oldest version that can be read."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -42,21 +42,21 @@ _FLOAT, _INDEX = "<f8", "<i4"
 
 @dataclass(frozen=True)
 class Layout:
-    """What an array of a map file has to be.
+    """Type, shape and conditions of an array of a map file.
 
     Attributes
     ----------
     dtype : str
-        Its type, byte order included.
+        Type, including the byte order.
     shape : tuple of int or str
-        Its shape; a word is a length that all arrays naming it share, and 1 or more, or 0 too
-        where it ends in a question mark.
+        Shape. A word is a length of 1 or more, equal in all arrays that name it. With a question
+        mark at its end it may be 0.
     below : str, optional
-        For indices: the word for the length that they must stay below; 0 or more.
+        For indices from 0: the word for the length below which they must lie.
     finite : bool, optional
         Whether every number must be finite.
     holds : callable, optional
-        Returns whether the array is what `must` says.
+        Returns whether the array meets the condition of `must`.
     must : str, optional
         Completes "must ...".
     """
@@ -114,8 +114,8 @@ _NPY = re.compile(
     rb"'shape': \(((?:\d{1,12}(?:, \d{1,12})*)?),?\), \} *\n"
 )
 _LONGEST_HEAD = 4096
-_ROOM = 64 << 20  # bytes that any file may unpack to
-_RATIO = 100  # ... and how often its own size where it is larger; a map of 4,000 blocks: 2
+_ROOM = 64 << 20  # bytes to which any file may unpack
+_RATIO = 100  # times its own size to which a larger file may unpack; a map of 4,000 blocks: 2
 _LARGEST = 4 << 30
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _DAMAGE = (
@@ -133,14 +133,14 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
     Parameters
     ----------
     path : path or binary stream
-        Where to.
+        Destination.
     arrays : dict of arrays
-        Those of ARRAYS, of any type that converts without loss.
+        The arrays of ARRAYS, of any type that converts without loss.
 
     Raises
     ------
     InputError
-        An array is missing, unknown, or not what ARRAYS says.
+        An array is missing, unknown, or not as described in ARRAYS.
     """
     exact = {
         name: np.ascontiguousarray(arrays[name], layout.dtype).reshape(np.shape(arrays[name]))
@@ -160,7 +160,7 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
 
 
 def _write_whole(path: Path, content: bytes) -> None:
-    """Write a file beside its place and move it there."""
+    """Write a file beside its destination and move it there."""
     target = path.resolve()
     part = target.with_name(f".geounfold-{uuid.uuid4().hex}.part")
     try:
@@ -226,7 +226,7 @@ def _content(path: Path) -> bytes:
 
 
 def _members(archive: zipfile.ZipFile, size: int, path: Path) -> dict[str, zipfile.ZipInfo]:
-    """Return the members by name, after a look at the directory alone."""
+    """Return the members by name, read from the directory only."""
     members: dict[str, zipfile.ZipInfo] = {}
     for info in archive.infolist():
         if info.filename in members:
@@ -248,7 +248,7 @@ def _members(archive: zipfile.ZipFile, size: int, path: Path) -> dict[str, zipfi
 def _array(
     archive: zipfile.ZipFile, members: Mapping[str, zipfile.ZipInfo], name: str, path: Path
 ) -> NDArray[Any]:
-    """Return one array, of the type its layout asks for and the shape its header tells."""
+    """Return one array, of the type in its layout and the shape in its header."""
     if f"{name}.npy" not in members:
         raise _foreign(path)
     dtype = np.dtype({**_HEAD, **ARRAYS}[name].dtype)
@@ -270,7 +270,7 @@ def _array(
 
 
 def _check_version(head: Arrays, path: Path) -> None:
-    """Raise where the file is no map, or one of another version."""
+    """Raise if the file is not a map, or of another version."""
     if any(a.shape != () for a in head.values()) or str(head["format"]) != FORMAT:
         raise _foreign(path)
     version = int(head["version"])
@@ -287,7 +287,7 @@ def _check_version(head: Arrays, path: Path) -> None:
 
 
 def _check_names(found: set[str], wanted: set[str], source: str) -> None:
-    """Raise where arrays are missing, or ones are there that no map has."""
+    """Raise if arrays are missing or unknown."""
     for names, what in ((wanted - found, "lacks"), (found - wanted, "holds more than a map:")):
         if names:
             some = ", ".join(_shown(name) for name in sorted(names)[:3])
@@ -296,7 +296,7 @@ def _check_names(found: set[str], wanted: set[str], source: str) -> None:
 
 
 def _check_arrays(arrays: Arrays, source: str) -> None:
-    """Raise where an array is not what its layout says, or does not fit the others."""
+    """Raise if an array differs from its layout or does not fit the others."""
     lengths: dict[str, int] = {}
     for name, layout in ARRAYS.items():
         shape = arrays[name].shape

@@ -23,22 +23,22 @@ from geounfold.mapping.mesh_space import MeshImage, MeshSpace
 from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
 
 REACH = 3.0
-"""How far past the control mesh points are carried, in blocks, where nothing else is asked for."""
+"""Default of the largest distance from the control mesh at which points are carried, in blocks."""
 
 
-_SLICE = 1 << 14  # points that a thread carries at once: they stay in its cache
+_SLICE = 1 << 14  # points that a thread carries at a time; they fit in its cache
 
 
-_MISSED = 1 << 18  # points that libigl places at once
+_MISSED = 1 << 18  # points that libigl places at a time
 
 
 class UnfoldingMap:
     """A fitted unfolding: carries any points to the flat space and back.
 
-    Points of the control mesh, and of the shell around it, go there and back exactly: both are
-    the same tetrahedra in either space, none of which overlap where the map is certified.  A
-    control mesh without a shell is continued by its nearest element, which is no such map: a
-    point outside comes back to another place.  What lies farther than the reach has no image.
+    Points in the control mesh and in the shell return exactly: both spaces have the same
+    tetrahedra, and none overlap if the map is certified. A control mesh without a shell is
+    continued by its nearest element. That continuation is not one-to-one: a point outside returns
+    to another place. A point farther away than the reach has no image.
 
     Parameters
     ----------
@@ -52,10 +52,10 @@ class UnfoldingMap:
         Largest distance from the control mesh at which points are carried, in working units
         (blocks).  A shell may end nearer, where limbs or a hinge's inner side leave no room.
     known : sequence of TetIndex, optional
-        Trees already built, used where they are over a space of the control mesh.
+        Trees already built, used if they are over a space of the control mesh.
     coordinates : str
         ``tet``: the map is affine in every tetrahedron.  ``wachspress`` or ``mvc``: points in
-        prisms go by coordinates of the prism's corners, which is smooth inside; the inverse is
+        prisms are carried by coordinates of the prism's corners, smooth inside; the inverse is
         found by Newton's method to 1e-12 of the mesh's size.
 
     Raises
@@ -107,7 +107,7 @@ class UnfoldingMap:
 
     @cached_property
     def prisms(self) -> PrismInterpolant | None:
-        """The prisms and their coordinates; None where the tetrahedra carry all points."""
+        """The prisms and their coordinates; None if the tetrahedra carry all points."""
         if self.coordinates == "tet":
             return None
         return PrismInterpolant.of(self.whole, self.coordinates)
@@ -178,7 +178,7 @@ class UnfoldingMap:
     def _by_prisms(
         self, prisms: PrismInterpolant, points: Floats, carried: Carried, *, inverse: bool
     ) -> int:
-        """Put what prisms carry in the place of the tetrahedra's answer; count the unsolved."""
+        """Replace the tetrahedra's images by those of prisms; count the unsolved points."""
         mesh = self.whole.unfolded if inverse else self.whole.folded
         placed, unsolved = np.flatnonzero(carried.placed), 0
         for part in slices(len(placed), _MISSED):
@@ -203,14 +203,14 @@ class UnfoldingMap:
         return unsolved
 
     def returned(self, points: Floats, carried: Carried) -> Returned:
-        """Return how points come back from where they were carried.
+        """Return the round trip of points from their images.
 
         Parameters
         ----------
         points : (n, 3) float
             In the data's coordinates.
         carried : Carried
-            As ``carry`` gave them.
+            Result of ``carry``.
         """
         largest, lost = 0.0, np.zeros(len(points), dtype=bool)
         for rows in slices(len(points), _MISSED):
@@ -279,7 +279,7 @@ class UnfoldingMap:
         write_arrays(path, self._arrays())
 
     def __reduce__(self) -> tuple[Callable[..., UnfoldingMap], tuple[dict[str, np.ndarray]]]:
-        """Pickle as plain arrays: trees and tables are made anew where they are needed."""
+        """Pickle as plain arrays; trees and tables are rebuilt when they are needed."""
         return _of_arrays, (self._arrays(),)
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -313,7 +313,7 @@ def load(path: str | Path) -> UnfoldingMap:
 
 
 def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:
-    """Return the map that such arrays keep."""
+    """Return the map stored in the arrays."""
     steps = arrays["steps"]
     frame = Frame(
         arrays["origin"],

@@ -1,4 +1,4 @@
-"""One space of a control mesh: which tetrahedron holds a point, and what lies outside."""
+"""One space of a control mesh: point location in its tetrahedra and outside them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers, TetMesh
 from geounfold.geometry.point_location import TetWalk
 
 TOUCHING = 1e-9
-"""A point this near to a mesh, as a share of the mesh's size, lies in it: rounding."""
+"""Distance, as a share of the mesh's size, up to which a point counts as inside: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where points lie in one space: see Carried; barycentric coordinates (n, 4)."""
+    """Location of points in one space, as in Carried, and barycentric coordinates (n, 4)."""
 
     element: Ints
     inside: Bools
@@ -28,7 +28,7 @@ class _Place:
 
 
 class MeshImage:
-    """Where each tetrahedron's places come to lie: affine in barycentric coordinates."""
+    """Images of points in each tetrahedron: affine in barycentric coordinates."""
 
     def __init__(self, mesh: TetMesh, stratigraphic: Floats) -> None:
         values = [*mesh.V.T, stratigraphic]
@@ -76,9 +76,9 @@ class MeshSpace:
     shell : TetMesh or None
         Tetrahedra around it.
     reach : float
-        How far points are continued by the nearest element where there is no shell.
+        Largest distance at which the nearest element carries points, if there is no shell.
     known : sequence of TetIndex
-        Trees already built, used where one is over this very mesh.
+        Trees already built, used if one is over this mesh.
     """
 
     def __init__(
@@ -91,12 +91,12 @@ class MeshSpace:
 
     @cached_property
     def walk(self) -> TetWalk:
-        """What places nearly all points of the control mesh."""
+        """The index that locates nearly all points of the control mesh."""
         return TetWalk(self._mesh.V, self._mesh.T)
 
     @cached_property
     def _index(self) -> TetIndex:
-        """What places the others, and says what is right."""
+        """The reference index, which locates the other points."""
         V, T = self._mesh.V, self._mesh.T
         same = [t for t in self._known if np.array_equal(t.T, T) and np.array_equal(t.V, V)]
         return same[0] if same else TetIndex(V, T)

@@ -26,21 +26,21 @@ COORDINATES = ("tet", "wachspress", "mvc")
 """Kinds of coordinates: of the tetrahedra, or of the prisms that they are cut from."""
 
 TOLERANCE = 1e-12
-"""How near the inverse comes to the point asked for, as a share of the mesh's size."""
+"""Tolerance of the inverse, as a share of the mesh's size."""
 
 _BORDER = 1e-12  # barycentric coordinate from which on a point lies on the prism's border
 _INSIDE = -1e-9  # barycentric coordinate down to which a point counts as inside, for rounding
-_STEPS = 50  # of Newton's method
+_STEPS = 50  # most steps of Newton's method
 _HALVINGS = 12
-_DECREASE = 1e-4  # share of a step's promise that the residual has to shrink by
-_CHUNK = 1 << 11  # points at once: 8 MB
+_DECREASE = 1e-4  # smallest decrease of the residual, as a share of the predicted one
+_CHUNK = 1 << 11  # points at a time: 8 MB
 
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, eq=False)
 class PrismInterpolant:
-    """A control mesh's prisms, and how points in them are carried.
+    """The prisms of a control mesh, which carry the points in them.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class PrismInterpolant:
     rows, corners : (p, 3), (p, 6) int
         See ``whole_prisms``: those that are upright in both spaces.
     prism : (m,) int
-        The prism of each tetrahedron, -1 for one on its own, which carries as ever.
+        The prism of each tetrahedron, -1 if it belongs to none and carries points itself.
     border : (m, 4) bool
         Whether the face opposite to each corner of a tetrahedron is on its prism's border.
     rational : (p,) bool
         Prisms with Wachspress coordinates: folded they are strictly convex.  The others have mean
         value coordinates.
     tolerance : float
-        How near the inverse comes, in the unfolded space.
+        Tolerance of the inverse, a distance in the unfolded space.
     """
 
     control: ControlMesh
@@ -102,7 +102,7 @@ class PrismInterpolant:
     def held(self, element: Ints, weights: Floats) -> Ints:
         """Return the rows of points that prisms carry: those inside one, off its border.
 
-        On the border, and outside of the mesh, a point goes as its tetrahedron says.
+        Tetrahedra carry the points on the border and outside of the mesh.
 
         Parameters
         ----------

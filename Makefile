@@ -43,11 +43,14 @@ demo: $(STAMP)  ## simulate a folded body, unfold it, write a report and say whe
 	    --summary demo/summary.json --map demo/map.npz --report demo/report.html --overwrite
 	@echo "Report: $(CURDIR)/demo/report.html"
 
-test: $(STAMP)  ## run the tests and the docstrings' examples
-	$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGS)
+# One process a core, one thread each. PYTEST_ARGS="-n 0" runs one process, "--shuffle 1" shuffles.
+TESTS = OMP_NUM_THREADS=$${OMP_NUM_THREADS:-1} $(BIN)/python -m pytest -n auto --dist loadfile
+
+test: $(STAMP)  ## run the tests and the docstrings' examples, on all cores
+	$(TESTS) -m 'not slow' $(PYTEST_ARGS)
 
 test-all: $(STAMP)  ## run the tests, slow ones included
-	$(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(TESTS) $(PYTEST_ARGS)
 
 check: $(STAMP)  ## formatting, lint, types, import contract, notebooks equal to their scripts
 	$(BIN)/ruff format --check .

@@ -16,7 +16,7 @@ from geounfold.body.lattice import (
     proper_permutations,
 )
 from geounfold.errors import InputError
-from tests.places import SHARED
+from tests.places import acceptance
 
 UTM = np.array([5e5, 1e7, 300.0])
 
@@ -130,10 +130,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_lattices_of_the_acceptance_bodies(name):
-    path = SHARED / "acceptance" / "cases" / f"{name}.csv"
-    if not path.exists():
-        pytest.skip("the shared acceptance bodies are not beside this checkout")
-    table = pd.read_csv(path)
+    table = pd.read_csv(acceptance(name))
     columns = ["XC", "YC", "ZC"] if "XC" in table else [f"centroid_{a}" for a in "xyz"]
     lattice = measure_lattice(table[columns].to_numpy(float))
     if CASES[name] is None:

@@ -11,7 +11,7 @@ from geounfold.body.lattice import measure_lattice
 from geounfold.body.separate import describe_bodies, select_body, separate_bodies
 from geounfold.body.working_frame import Frame, working_frame
 from geounfold.errors import InputError, OptionError
-from tests.places import SHARED
+from tests.places import acceptance
 from tests.shapes import grid_cells
 
 PLAIN = Frame(np.zeros(3), np.eye(3), 1.0, None)
@@ -126,10 +126,7 @@ def test_narrow_strips_flat_slabs_and_sub_blocks_pass():
     "name", ["thin", "lens", "flat_blocks", "noisy", "sim_case_1", "unfolding_jl"]
 )
 def test_acceptance_bodies_pass_and_are_one_body(name):
-    path = SHARED / "acceptance" / "cases" / f"{name}.csv"
-    if not path.exists():
-        pytest.skip("the shared acceptance bodies are not beside this checkout")
-    table = pd.read_csv(path)
+    table = pd.read_csv(acceptance(name))
     columns = ["XC", "YC", "ZC"] if "XC" in table else [f"centroid_{a}" for a in "xyz"]
     points = table[columns].to_numpy(float)
     check_points(points)

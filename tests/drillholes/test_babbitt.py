@@ -11,23 +11,20 @@ from geounfold.drillholes import CompositeOptions, DrillHoles, read_drillholes
 from geounfold.drillholes.composite import composite
 from geounfold.drillholes.desurvey import directions
 from tests.drillholes.holes import found
-from tests.places import SHARED_DATA
-
-BABBITT = SHARED_DATA / "babbitt"
+from tests.places import shared
 
 
 @pytest.fixture(scope="module")
 def babbitt() -> DrillHoles:
-    if not BABBITT.is_dir():
-        pytest.skip("the Babbitt drill-holes are not beside this checkout")
+    folder = shared("data", "babbitt")
     return read_drillholes(
-        *(BABBITT / f"{kind}_BABBITT.csv" for kind in ("collar", "survey", "assay"))
+        *(folder / f"{kind}_BABBITT.csv" for kind in ("collar", "survey", "assay"))
     )
 
 
 def test_babbitt_desurveys_with_its_bad_rows_named(babbitt: DrillHoles) -> None:
     # What is wrong with the survey table by another reading of it: depths of 90000, in 70 rows.
-    with (BABBITT / "survey_BABBITT.csv").open() as stream:
+    with shared("data", "babbitt", "survey_BABBITT.csv").open() as stream:
         survey = list(csv.DictReader(stream))
     bad = {(r["BHID"], k + 1) for k, r in enumerate(survey) if float(r["AT"]) == 90000}
     assert len(bad) == 70

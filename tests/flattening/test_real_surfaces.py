@@ -17,9 +17,7 @@ from geounfold.flattening import (
 )
 from geounfold.geometry.mesh import TriMesh
 from tests.flattening.meshes import METHODS
-from tests.places import SHARED_DATA
-
-SHARED = SHARED_DATA
+from tests.places import shared
 
 
 def read_tsurf(path):
@@ -42,42 +40,33 @@ def read_obj(path):
     return np.array(V), np.array(F)
 
 
-FAULTS = sorted((SHARED / "scec_cfm").glob("*.ts"))
+def faults():
+    """Files of the shared fault surfaces."""
+    return sorted(shared("data", "scec_cfm").glob("*.ts"))
 
 
-BENCHMARKS = SHARED / "param_bff"
+def benchmark(name):
+    """A shared benchmark mesh."""
+    return read_obj(shared("data", "param_bff", f"{name}.obj"))
 
 
-needs_faults = pytest.mark.skipif(
-    not FAULTS, reason="the shared fault surfaces (scec_cfm) are absent"
-)
-
-
-needs_benchmarks = pytest.mark.skipif(
-    not BENCHMARKS.is_dir(), reason="the shared benchmark meshes (param_bff) are absent"
-)
-
-
-@needs_faults
 @pytest.mark.parametrize("method", ["arap", "lscm", "spring"])
 def test_every_real_fault_is_flattened_one_to_one(method):
-    for path in FAULTS:
+    for path in faults():
         flat = flatten(read_tsurf(path), method)
         assert (flat.flips, flat.overlaps) == (0, 0), path.name
 
 
-@needs_faults
 @pytest.mark.parametrize("method", ["scaf", "slim"])
 def test_libigls_injective_methods_flatten_a_real_fault(method):
-    flat = flatten(read_tsurf(min(FAULTS, key=lambda p: p.stat().st_size)), method)
+    flat = flatten(read_tsurf(min(faults(), key=lambda p: p.stat().st_size)), method)
     assert flat.one_to_one
     assert flat.area_error[-1] < 1e-3  # measured 4.6e-5
 
 
-@needs_benchmarks
 @pytest.mark.parametrize("method", [m for m in METHODS if m != "spring_dynamic"])
 def test_hemisphere_is_flattened_one_to_one_and_keeps_its_strain(method):
-    V, F = read_obj(BENCHMARKS / "hemisphere.obj")
+    V, F = benchmark("hemisphere")
     flat = flatten((V, F), method)
     assert flat.one_to_one
     # Measured 0.117 (springs) to 0.202 (LSCM): a hemisphere has no flat image without strain.
@@ -86,11 +75,10 @@ def test_hemisphere_is_flattened_one_to_one_and_keeps_its_strain(method):
 
 
 @pytest.mark.slow
-@needs_benchmarks
 @pytest.mark.parametrize("method", ["arap", "lscm", "spring"])
 @pytest.mark.parametrize("name", ["spothead", "face", "beetle"])
 def test_benchmark_disks_are_one_to_one_or_a_row_that_says_why(name, method):
-    row = compare(read_obj(BENCHMARKS / f"{name}.obj"), method).iloc[0]
+    row = compare(benchmark(name), method).iloc[0]
     if row.error:
         assert re.search(r"folded over|border edges overlap", row.error)
         assert "near" in row.error
@@ -98,7 +86,6 @@ def test_benchmark_disks_are_one_to_one_or_a_row_that_says_why(name, method):
         assert (row.flips, row.overlaps) == (0, 0)
 
 
-@needs_benchmarks
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -109,12 +96,11 @@ def test_benchmark_disks_are_one_to_one_or_a_row_that_says_why(name, method):
 )
 def test_benchmark_meshes_that_are_no_disk_are_refused(name, message):
     with pytest.raises(MeshError, match=message):
-        flatten(read_obj(BENCHMARKS / f"{name}.obj"))
+        flatten(benchmark(name))
 
 
-@needs_faults
 def test_springs_flatten_every_real_fault_without_flips():
-    for path in FAULTS:
+    for path in faults():
         flat = flatten(read_tsurf(path))
         assert flat.stop is Stop.CONVERGED, path.name
         assert flat.flips == 0, path.name

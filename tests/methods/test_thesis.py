@@ -16,10 +16,9 @@ from geounfold.geometry.mesh import TriMesh
 from geounfold.methods import thesis
 from geounfold.methods.thesis import ThesisOptions, build, joint, surfaces, thesis_control
 from geounfold.surfaces.hull import extract_hull
-from tests.places import ACCEPTANCE
+from tests.places import acceptance
 from tests.shapes import rotation
 
-CASES = ACCEPTANCE
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -449,10 +448,7 @@ def test_fans_that_meet_in_a_point_are_parted():
     ],
 )
 def test_simulated_cases_reach_the_thesis(case, truth, folded):
-    file = CASES / f"{case}.csv"
-    if not file.exists():
-        pytest.skip("the acceptance bodies are not beside this checkout")
-    table = pd.read_csv(file)
+    table = pd.read_csv(acceptance(case))
     X = table[["centroid_x", "centroid_y", "centroid_z"]].to_numpy()
     W = table[["true_x", "true_y", "true_z"]].to_numpy() / 10
     P = (X - X.mean(axis=0)) / 10

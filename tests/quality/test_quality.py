@@ -21,7 +21,7 @@ from geounfold.quality.truth import (
     random_pairs,
     spacing_ratios,
 )
-from tests.places import SHARED
+from tests.places import acceptance
 
 # Sums of 26 square roots of numbers near 1: a few units in the last place.
 ROUNDING = 1e-12
@@ -31,8 +31,6 @@ GRID = GRID.reshape(-1, 3)
 INSIDE = ((GRID > 0) & (GRID < GRID.max(axis=0))).all(axis=1)
 
 ROTATION = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # proper, exact
-
-CASE = SHARED / "acceptance" / "cases" / "sim_case_1.csv"
 
 
 def arch(P, radius=8.0):
@@ -137,9 +135,8 @@ def test_comparison_shows_what_doing_nothing_scores():
     assert set(same.summary()["epsilon_truth"]) == {"mean", "std", "p95", "max"}
 
 
-@pytest.mark.skipif(not CASE.exists(), reason=f"no acceptance body at {CASE}")
 def test_doing_nothing_scores_what_the_literature_case_says():
-    table = np.loadtxt(CASE, delimiter=",", skiprows=1)
+    table = np.loadtxt(acceptance("sim_case_1"), delimiter=",", skiprows=1)
     # An independent script (its own tree and mean) gives 0.01719.
     assert epsilon(table[:, 3:6], table[:, :3]).mean() == pytest.approx(0.01719, abs=5e-6)
 

@@ -18,7 +18,7 @@ from geounfold.surfaces.hull._finish import check_closed_manifold, largest_compo
 from geounfold.surfaces.hull.alpha import alpha_solid
 from geounfold.surfaces.hull.density import density_field
 from geounfold.surfaces.hull.outermost_points import outer_shell
-from tests.places import SHARED
+from tests.places import acceptance
 from tests.shapes import box
 
 UNIT = np.ones(3)
@@ -294,11 +294,9 @@ def test_sparse_marching_cubes_agree_with_dense() -> None:
     assert enclosed_volume(V, F) == pytest.approx(enclosed_volume(dense.V, dense.F), rel=1e-12)
 
 
-@pytest.mark.skipif(not (SHARED / "acceptance").is_dir(), reason="the shared bodies are absent")
 @pytest.mark.parametrize("case", ["steep", "sim_case_2"])
 def test_acceptance_bodies(case: str) -> None:
-    table = SHARED / "acceptance" / "cases" / f"{case}.csv"
-    points = np.loadtxt(table, delimiter=",", skiprows=1, usecols=(0, 1, 2)) / 10
+    points = np.loadtxt(acceptance(case), delimiter=",", skiprows=1, usecols=(0, 1, 2)) / 10
     hull = extract_hull(points - points.mean(axis=0), UNIT if case == "steep" else None)
     assert hull.method == "density"
     # Measured 0.989 and 0.97 with the true spacing of one block.

@@ -34,7 +34,7 @@ from geounfold.synthetic import (
     simulate,
     spherical_cap,
 )
-from tests.places import ACCEPTANCE, ROOT
+from tests.places import ROOT, acceptance
 
 DATA = ROOT / "data"
 
@@ -52,10 +52,7 @@ def test_thin_wide_body_has_the_size_of_the_benchmark() -> None:
 
 @pytest.mark.parametrize("name", ["sim_case_1", "sim_case_2"])
 def test_bodies_are_those_of_the_acceptance(name: str) -> None:
-    path = ACCEPTANCE / f"{name}.csv"
-    if not path.exists():
-        pytest.skip("the acceptance bodies are not beside this checkout")
-    theirs, body = pd.read_csv(path), simulate(name)
+    theirs, body = pd.read_csv(acceptance(name)), simulate(name)
     X = theirs[["centroid_x", "centroid_y", "centroid_z"]].to_numpy()
     assert_array_equal(theirs[["true_x", "true_y", "true_z"]].to_numpy(), body.truth)
     # Four decimals leave 5.0e-5; the rest is their linear interpolation in a table, 4.1e-6.

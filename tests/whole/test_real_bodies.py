@@ -6,16 +6,11 @@ import pytest
 
 import geounfold as gu
 from geounfold.geometry.measures import lengths, unique_edges
-from tests.places import SHARED_DATA
-
-DATA = SHARED_DATA
+from tests.places import shared
 
 
 def table(folder, name):
-    path = DATA / folder / name
-    if not path.is_file():
-        pytest.skip(f"the shared data ../shared/data/{folder}/{name} is not beside this checkout")
-    return pd.read_csv(path)
+    return pd.read_csv(shared("data", folder, name))
 
 
 @pytest.fixture(scope="module")

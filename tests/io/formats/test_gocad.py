@@ -9,10 +9,7 @@ import pytest
 
 from geounfold.io import read_points, write_surface
 from geounfold.io.surfaces import read_surface_with_meta
-from tests.places import SHARED_DATA
-
-SCEC = SHARED_DATA / "scec_cfm"
-
+from tests.places import shared
 
 # By SOURCE.md: vertices and triangles of surfaces written by GOCAD.
 TSURFS = {
@@ -23,12 +20,11 @@ TSURFS = {
 
 @pytest.mark.parametrize("name", TSURFS)
 def test_surfaces_by_gocad(name: str, tmp_path: Path) -> None:
-    if not SCEC.is_dir():
-        pytest.skip("the SCEC surfaces are not beside this checkout")
-    mesh, meta = read_surface_with_meta(SCEC / name)
+    path = shared("data", "scec_cfm", name)
+    mesh, meta = read_surface_with_meta(path)
     assert (len(mesh.V), len(mesh.F)) == TSURFS[name]
     assert meta == {"unit": "m"}
-    rows = [line.split() for line in (SCEC / name).read_text().splitlines()]
+    rows = [line.split() for line in path.read_text().splitlines()]
     corners = {int(r[1]): [float(v) for v in r[2:5]] for r in rows if r[:1] == ["VRTX"]}
     last = [r for r in rows if r[:1] == ["TRGL"]][-1][1:4]
     assert mesh.V[mesh.F[-1]].tolist() == [corners[int(k)] for k in last]

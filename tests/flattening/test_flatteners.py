@@ -24,15 +24,17 @@ from geounfold.flattening._start import check_disk
 from geounfold.geometry.measures import lengths, triangle_areas, unique_edges
 from geounfold.geometry.mesh import TriMesh
 from tests.flattening.meshes import EXACT, METHODS, annulus, cap, cylinder, edge_errors, grid, slab
+from tests.shapes import rotation
 
 # harmonic keeps neither lengths nor angles: test_harmonic.py holds its truths.
 SHAPELY = [m for m in METHODS if FLATTENERS[m].keeps != "nothing"]
 
 
 # Relative difference of lengths after a rigid motion.  Coordinates of 4e6 for a body of 350 leave
-# 1e-12 of rounding: measured 1.3e-11 at most.  The scaffold's frame has sides along the axes, so
-# scaf agrees as far as it converges: measured 7e-6; the cap's own strain is 1e-2.
-SAME = dict.fromkeys(METHODS, 1e-9) | {"scaf": 1e-4}
+# 1e-12 of rounding: measured 1.9e-11 at most over 20 rotations and orders of the vertices, with
+# OpenBLAS's Haswell and SkylakeX kernels alike.  The scaffold's frame has sides along the axes, so
+# scaf agrees as far as it converges: measured 1.4e-6; the cap's own strain is 1e-2.
+SAME = dict.fromkeys(METHODS, 1e-10) | {"scaf": 1e-5}
 
 
 def cone(n=11, m=8):
@@ -95,14 +97,14 @@ def test_spherical_cap_keeps_its_strain(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_rigid_motion_scale_and_vertex_order_change_nothing(method):
+    # Oblong: on a square cap the axis along which lscm pins its border is a tie that rounding
+    # breaks, and lengths differ by up to 0.7 %.
     V, F = cap(n=9)
+    V = V * [1.0, 0.8, 1.0]
     before = lengths(flatten((V, F), method).uv, unique_edges(F))
-    rng = np.random.default_rng(7)
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    turn *= np.sign(np.linalg.det(turn))
-    order = rng.permutation(len(V))
+    order = np.random.default_rng(7).permutation(len(V))
     place = np.argsort(order)
-    moved = (250.0 * V @ turn.T + [5e5, 4e6, -300])[order]
+    moved = (250.0 * V @ rotation(7).T + [5e5, 4e6, -300])[order]
     after = flatten((moved, place[F]), method).uv
     assert_allclose(lengths(after[place], unique_edges(F)) / 250, before, rtol=SAME[method])
 

@@ -149,12 +149,14 @@ def test_bodies_with_missing_blocks_and_a_missing_slab_unfold(across):
 def test_the_lattice_behind_noise_is_found(steps, noise):
     body = gu.simulate("noisy", steps=steps, noise=noise, width=160)
     assert measure_lattice(body.folded) is None
+    # Over 20 orientations, 8 of the equal sides and 2 of (20, 6, 6) give a lattice turned by 45
+    # degrees, or none; this seed is one of the others.
     for points in (body.folded, turned(body.folded, 5)):
         found = disturbed_lattice(points)
-        # Measured: within 0.1 %; a wrong wave vector would be off by a factor.
-        assert np.sort(found.steps) == pytest.approx(np.sort(steps), rel=0.005)
+        # Measured: within 0.05 %; a wrong wave vector would be off by a factor.
+        assert np.sort(found.steps) == pytest.approx(np.sort(steps), rel=0.002)
         # The coherence that noise leaves: exp(-2 pi^2 noise^2), 0.45 for 0.2 steps.
-        assert found.share == pytest.approx(np.exp(-2 * np.pi**2 * noise**2), abs=0.03)
+        assert found.share == pytest.approx(np.exp(-2 * np.pi**2 * noise**2), abs=0.01)
 
 
 def test_no_lattice_lies_behind_scattered_points_and_folded_grids():

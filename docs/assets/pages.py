@@ -20,5 +20,5 @@ def _help() -> str:
     chosen = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     parts = [f"```text\n{parser.format_help()}```\n"]
     for name, command in chosen[0].choices.items():
-        parts.append(f"## {name}\n\n```text\n{command.format_help()}```\n")
+        parts.append(f"## {name}\n\n```text\n{command.format_help(full=True)}```\n")
     return "\n".join(parts)

@@ -1,4 +1,4 @@
-"""Entry of the command line: from arguments to an exit status."""
+"""The entry of the command line: from words to an exit status."""
 
 from __future__ import annotations
 
@@ -27,23 +27,6 @@ _NO_MEMORY = re.compile(
     re.IGNORECASE,
 )
 
-_COMMANDS = {
-    "unfold": "unfold.unfold",
-    "map": "map.carry",
-    "estimate": "estimate.estimate",
-    "compare": "compare.compare",
-    "crosscheck": "crosscheck.crosscheck",
-    "quality": "quality.quality",
-    "simulate": "simulate.simulate",
-    "view": "view.view",
-    "grid": "blocks.grid",
-    "transfer": "blocks.transfer",
-    "init": "assistance.init",
-    "doctor": "assistance.doctor",
-    "completion": "assistance.completion",
-}
-"""The commands, and their functions in `geounfold.cli.commands`."""
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -51,14 +34,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     argv : sequence of str, optional
-        The arguments. Without, those of the process, and the run has a process of its own (see
-        `supervised`).
+        The words after ``geounfold``. Without them, those of the process are taken, and the
+        command runs in a process of its own, see `supervised`.
 
     Returns
     -------
     int
-        0 done, 2 input or options at fault, 1 anything else, 130 interrupted, 143 terminated,
-        129 hung up.
+        0 done, 2 the input or an option is wrong, 1 any other failure, 130 interrupted,
+        143 terminated, 129 hung up.
     """
     if argv is not None:
         with stoppable():
@@ -72,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _guarded(words: Sequence[str], journal: Journal, ready: Callable[[], None]) -> int:
-    """Run, and turn every way of ending into a status and a line."""
+    """Run a command, print the line of an error, and return the exit status."""
     console = Console(
         quiet="--quiet" in words, json="--json" in words, plain=_verbose(words), journal=journal
     )
@@ -88,13 +71,13 @@ def _verbose(words: Sequence[str]) -> bool:
 
 
 def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) -> tuple[int, str]:
-    """Run, and return the status and the line to leave with."""
+    """Run a command, and return the exit status and the line of an error."""
     try:
         try:
             ready()
             _run(words, console)
         finally:
-            ignore_stops()  # what is left is telling
+            ignore_stops()  # only the last line is left to print
     except SystemExit as leaving:  # after --help and --version
         return (leaving.code if isinstance(leaving.code, int) else 0), ""
     except KeyboardInterrupt as error:
@@ -115,16 +98,16 @@ def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) 
 
 
 def _lacks_memory(error: BaseException) -> bool:
-    """Return whether an error, or what caused it, is want of memory in one of its guises."""
+    """Return whether an error, or one that caused it, is a lack of memory."""
     seen: set[int] = set()
     link: BaseException | None = error
     while link is not None and id(link) not in seen:
         seen.add(id(link))
         if isinstance(link, MemoryError) or getattr(link, "errno", None) == errno.ENOMEM:
             return True
-        if isinstance(link, SystemError) and memory_is_limited():  # a library lost the reason
+        if isinstance(link, SystemError) and memory_is_limited():  # a library has lost the cause
             return True
-        foreign = not isinstance(link, GeounfoldError)  # ours may quote a file
+        foreign = not isinstance(link, GeounfoldError)  # one of ours may quote a file
         if foreign and _NO_MEMORY.search(str(link)):
             return True
         link = link.__cause__ or link.__context__
@@ -132,27 +115,22 @@ def _lacks_memory(error: BaseException) -> bool:
 
 
 def _run(words: Sequence[str], console: Console) -> None:
-    """Parse the arguments and hand them to their command."""
+    """Parse the words and run their command."""
     args = parse(words)
-    if args.command is None:
-        from geounfold.errors import OptionError
-
-        raise OptionError(f"a command is needed: {', '.join(_COMMANDS)} (see 'geounfold --help')")
     with _logging(args.verbose):
-        _command(args.handler)(args, console)
+        _command(args.command)(args, console)
 
 
 def _command(name: str) -> Callable[[Namespace, Console], None]:
-    """Return a command's function; its module alone is loaded."""
-    home, _, function = _COMMANDS[name].partition(".")
-    module = import_module(f"geounfold.cli.commands.{home}")
-    found: Callable[[Namespace, Console], None] = getattr(module, function)
-    return found
+    """Return a command's function; no other command is loaded."""
+    run: Callable[[Namespace, Console], None]
+    run = import_module(f"geounfold.cli.commands.{name}").run
+    return run
 
 
 @contextmanager
 def _logging(verbosity: int) -> Iterator[None]:
-    """Send log records and Python's warnings to stderr, with -v; nowhere without."""
+    """With -v, send log records and Python's warnings to stderr; without, drop them."""
     level = {0: logging.CRITICAL + 1, 1: logging.INFO}.get(verbosity, logging.DEBUG)
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
@@ -174,7 +152,7 @@ def _logging(verbosity: int) -> Iterator[None]:
 
 
 def _leave_full_stdout() -> None:
-    """Leave a stdout that does not take what it holds."""
+    """Flush stdout; leave it if its disk is full."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -183,7 +161,7 @@ def _leave_full_stdout() -> None:
 
 
 def _leave_stdout() -> None:
-    """Point stdout at nothing, so that the interpreter's last flush does not complain."""
+    """Point stdout at the null device, so that the interpreter's last flush does not fail."""
     with suppress(OSError, ValueError):
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, sys.stdout.fileno())

@@ -301,7 +301,7 @@ def test_unfold_tells_volumes_where_sides_are_known(tmp_path: Path, how: str) ->
     [
         (["unfold", "P", "-o", "O.csv", "--sizes", "a,b,c"], "no column 'a' for --sizes"),
         (["unfold", "P", "-o", "O.csv", "--sizes", "1,0,1"], "three positive lengths"),
-        (["grid", "P", "-o", "G.csv", "--sizes", "5,5"], "--sizes needs three numbers"),
+        (["grid", "P", "-o", "G.csv", "--sizes", "5,5"], "--sizes needs three finite numbers"),
         (["grid", "P", "-o", "G.csv", "--sizes", "5,5,-1"], "three positive sides"),
         (["transfer", "M.npz", "P", "P", "-o", "O.csv", "--values", "au"], "M.npz"),
         (
@@ -313,7 +313,7 @@ def test_unfold_tells_volumes_where_sides_are_known(tmp_path: Path, how: str) ->
         (["transfer", "P", "P", "P", "-o", "O.csv", "--values", "v,v"], "different column names"),
         (
             ["transfer", "P", "P", "P", "-o", "O.csv", "--values", "v", "--rotation", "east"],
-            "--rotation needs three numbers",
+            "--rotation needs three finite numbers",
         ),
     ],
 )

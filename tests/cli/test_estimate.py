@@ -83,8 +83,8 @@ def test_other_methods(files, tmp_path: Path, method: str) -> None:
     ("more", "said"),
     [
         (("--method", "idw"), "is not one of"),
-        (("--radii", "1,2"), "--radii needs three numbers"),
-        (("--radii", "1,2,a"), "--radii needs a number"),
+        (("--radii", "1,2"), "--radii needs three finite numbers"),
+        (("--radii", "1,2,a"), "--radii needs three finite numbers"),
         (("--radii", "1,2,inf"), "finite"),
         (("--radii", "1,2,0"), "radii must be above 0"),
         (("--rotation", "1,2,3"), "--rotation needs --radii"),

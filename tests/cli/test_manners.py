@@ -19,7 +19,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from geounfold.cli import doctor, main
+from geounfold.cli import main
+from geounfold.cli.commands import doctor
 from geounfold.cli.terminal import progress
 from geounfold.cli.terminal.console import Console
 from geounfold.cli.terminal.time_left import SHARES, Forecast
@@ -406,7 +407,7 @@ def test_bash_completes(words: str, expected: set[str], completer: Path) -> None
 @pytest.fixture(scope="module")
 def completer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("shtab", reason="the extra `completion` is not installed")
-    from geounfold.cli.terminal.completion import script
+    from geounfold.cli.commands.completion import script
 
     path = tmp_path_factory.mktemp("shell") / "geounfold.bash"
     path.write_text(script("bash"))

@@ -144,10 +144,10 @@ def test_values_come_back_to_local_blocks(body: SimpleNamespace) -> None:
     ("words", "says"),
     [
         (["--rotation", "10,0,0"], "give --origin too"),
-        (["--origin", "1,2"], "--origin needs three numbers"),
-        (["--origin", "0,0,nan"], "origin must be three numbers"),
+        (["--origin", "1,2"], "--origin needs three finite numbers"),
+        (["--origin", "0,0,nan"], "--origin needs three finite numbers"),
         (["--origin", "0,0,0", "--rotation", "0,95,0"], "within 90"),
-        (["--origin", "0,0,0", "--rotation", "x"], "--rotation needs three numbers"),
+        (["--origin", "0,0,0", "--rotation", "x"], "--rotation needs three finite numbers"),
     ],
 )
 def test_bad_frames_are_one_line_and_status_2(

@@ -267,7 +267,7 @@ def test_read_only_folder(tmp_path: Path, points: Path, fails: Callable[..., str
 @pytest.mark.parametrize(
     ("argv", "words"),
     [
-        ([], ("a command is needed", "unfold", "simulate")),
+        (["--"], ("COMMAND", "geounfold --help")),
         (["fold"], ("'fold'", "'unfold'", "'compare'")),
         (["unfold"], ("POINTS", "-o/--output")),
         (["unfold", "p.csv", "-o"], ("-o/--output", "expected one argument")),
@@ -288,20 +288,22 @@ def test_arguments(
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
-        ("--method", "magic", ("magic", "sheet", "thesis")),
-        ("--flattener", "iron", ("iron", "spring")),
-        ("--hull", "balloon", ("balloon", "density", "alpha")),
-        ("--split", "axe", ("axe", "signed", "normal")),
-        ("--datum", "sea", ("sea", "mid", "top", "bottom", "proportional")),
-        ("--up", "0,0", ("--up", "0,0")),
-        ("--up", "-1,x,0", ("--up", "-1,x,0")),
-        ("--up", "0,0,0", ("up",)),
-        ("--up", "nan,0,1", ("up",)),
+        ("--method", "magic", ("--method: method must be one of sheet, thesis", "'magic'")),
+        ("--flattener", "iron", ("--flattener: ", "spring", "'iron'")),
+        ("--hull", "balloon", ("--hull: hull must be one of auto", "density", "'balloon'")),
+        ("--split", "axe", ("--split: split must be one of", "signed", "normal", "'axe'")),
+        ("--datum", "sea", ("--datum: datum must be one of", "mid", "proportional", "'sea'")),
+        ("--up", "0,0", ("--up: up must be a list of 3 numbers", "[0, 0]")),
+        ("--up", "-1,x,0", ("--up: up must be a list of 3 numbers", "[-1, 'x', 0]")),
+        ("--up", "0,0,0", ("--up: up must be", "not all 0")),
+        ("--up", "nan,0,1", ("--up: up must be a list of 3 numbers",)),
+        ("--reach", "far", ("--reach: reach must be a number of 0 or more", "'far'")),
+        ("--reach", "-1", ("--reach: reach must be a number of 0 or more", "-1")),
         ("--body", "-1", ("--body", "all")),
         ("--body", "99", ("body", "all")),
         ("--body", "both", ("--body", "all")),
-        ("--neighbours", "-3", ("--neighbours",)),
-        ("--neighbours", "2.5", ("--neighbours",)),
+        ("--neighbours", "-3", ("--neighbours: neighbours must be a whole number of 1 or more",)),
+        ("--neighbours", "2.5", ("--neighbours: neighbours must be a whole number", "2.5")),
     ],
 )
 def test_option_value(

@@ -1,1 +1,1 @@
-"""What commands write and print: result tables, figures, reports."""
+"""What commands write and print: tables, summaries, figures, the data of reports."""

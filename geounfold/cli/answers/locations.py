@@ -1,4 +1,4 @@
-"""Where carried points lie: in the control mesh, around it, or beyond its reach."""
+"""Where carried points lie: in the control mesh, around it, or beyond the map's reach."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.cli.terminal.console import Console
 from geounfold.io.result_columns import UNFOLDED, result_columns
 
 if TYPE_CHECKING:
@@ -17,27 +16,37 @@ if TYPE_CHECKING:
 
 
 def flat_columns(saved: UnfoldingMap | PointwiseMap) -> Callable[[Floats], dict[str, Any]]:
-    """Return what carries points to the flat side, into output columns."""
+    """Return the function from folded points, (n, 3), to the output columns of the unfolded."""
     return lambda points: result_columns(UNFOLDED, saved.carry(points))
 
 
 def place_counts(columns: dict[str, Any]) -> dict[str, int]:
-    """Return how many points were carried, and how many of them not by the control mesh."""
+    """Return how many points there are, and how many are extrapolated and outside."""
     location = columns["location"]
     words = ("extrapolated", "outside")
     return {"carried": len(location), **{w: int(np.count_nonzero(location == w)) for w in words}}
 
 
-def warn_of_outside(path: str, places: dict[str, int], console: Console) -> None:
-    """Say how many carried points the control mesh does not hold."""
-    total, extrapolated, empty = (places[word] for word in ("carried", "extrapolated", "outside"))
+def outside_warnings(source: str, counts: dict[str, int]) -> list[str]:
+    """Return the warnings of points outside the control mesh.
+
+    Parameters
+    ----------
+    source : str
+        The points' file.
+    counts : dict
+        See `place_counts`.
+    """
+    total, extrapolated, outside = (counts[w] for w in ("carried", "extrapolated", "outside"))
+    found = []
     if extrapolated:
-        console.warn(
-            f"{path}: {extrapolated} of {total} points lie outside the control mesh and "
+        found.append(
+            f"{source}: {extrapolated} of {total} points lie outside the control mesh and "
             "were carried by its continuation; they are marked extrapolated"
         )
-    if empty:
-        console.warn(
-            f"{path}: {empty} of {total} points lie farther from the control mesh than "
+    if outside:
+        found.append(
+            f"{source}: {outside} of {total} points lie farther from the control mesh than "
             "the map reaches; they were left empty and are marked outside"
         )
+    return found

@@ -1,1 +1,1 @@
-"""The arguments of every command, one module for each group of commands."""
+"""The arguments and the help of every command, one module for each group of commands."""

@@ -2,87 +2,95 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from geounfold.cli.arguments.shared import (
-    ANGLES_HELP,
-    POINTS_HELP,
-    TABLES_HELP,
-    add_command,
-    add_frame,
-)
+from geounfold.cli.arguments.groups import add_command, add_frame
+from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.texts import ANGLES, POINT_FORMATS, POINTS, TABLES, joined
 
 _GRID = """\
-The grid's blocks lie along the axes of the unfolded space, with faces at whole multiples of their
-sides: columns x, y, z, dx, dy, dz, and i, j, k from 0."""
+The blocks lie along the axes of the unfolded space; their faces are at whole
+multiples of their sides. Columns: x, y, z, dx, dy, dz, and i, j, k from 0.
+Columns unfolded_x/y/z of FLAT are read before other coordinates."""
+
+_TRANSFER = """\
+Each block of TARGET is cut into equal parts. A part has the value of the block
+of SOURCE at the image of its centre. OUT has the mean over the parts, and
+NAME_share, the share of the parts that have a value. The summary has the sums
+of volume times value of both files.
+
+Sides are columns (XINC, dx, size_x and alike are found) or lengths; without,
+they are the steps of the centroids' lattice."""
 
 
-_TRANSFER = (
-    """\
-Each target block is cut into equal parts; the source block at the image of a part's centre gives
-its value, and the mean over the parts is written, with NAME_share, the share of the parts that have
-one. The summary has the sums of volume times value on both sides.
-
-Sides are columns (XINC, dx, size_x and alike are found) or the steps of the centroids' lattice.
-
-"""
-    + ANGLES_HELP
-)
-
-
-def add_grid(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_grid(commands: Any) -> Parser:
     """Add the command grid and its arguments."""
     parser = add_command(
-        commands, "grid", "make a regular grid of blocks over unfolded points", common, _GRID
+        commands,
+        "grid",
+        "make a regular grid of blocks over unfolded points",
+        details=joined(_GRID, POINT_FORMATS),
+        examples=(
+            "geounfold grid flat.csv -o grid.csv --sizes 10,10,5",
+            "geounfold grid flat.csv -o grid.csv --sizes 10,10,5 --map m.npz",
+        ),
     )
-    parser.add_argument(
-        "points",
-        metavar="FLAT",
-        help=f"what it covers: {TABLES_HELP}; columns unfolded_x/y/z come first where they exist",
-    )
-    parser.add_argument("-o", "--output", metavar="GRID", required=True, help=TABLES_HELP)
-    parser.add_argument("--sizes", metavar="X,Y,Z", required=True, help="sides of a block")
-    parser.add_argument(
-        "--map", metavar="M.npz", help="leave out blocks no part of which lies in this map's body"
-    )
-    parser.add_argument("--columns", metavar="A,B,C", help="the coordinate columns")
+    group = parser.section("grid")
+    group.add("points", metavar="FLAT", help=f"unfolded points that the grid covers: {POINTS}")
+    group.add("--columns", metavar="A,B,C", help="columns of the coordinates")
+    group.add("-o", "--output", metavar="GRID", required=True, help=f"the blocks: {TABLES}")
+    group.add("--sizes", metavar="X,Y,Z", required=True, help="sides of a block")
+    group.add("--map", metavar="M.npz", help="keep only blocks with a part in this map's body")
     parser.set_defaults(drop_invalid=False)
+    return parser
 
 
-def add_transfer(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_transfer(commands: Any) -> Parser:
     """Add the command transfer and its arguments."""
     parser = add_command(
-        commands, "transfer", "move values between folded and unfolded blocks", common, _TRANSFER
+        commands,
+        "transfer",
+        "move values between folded and unfolded blocks",
+        details=joined(_TRANSFER, ANGLES, POINT_FORMATS),
+        examples=(
+            "geounfold transfer m.npz grid.csv blocks.csv -o graded.csv --values au,cu",
+            "geounfold transfer m.npz blocks.csv grid.csv -o flat.csv --values au \\\n"
+            "    --to unfolded --summary s.json",
+        ),
     )
-    parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
-    parser.add_argument("source", metavar="SOURCE", help=f"blocks that have values: {POINTS_HELP}")
-    parser.add_argument("target", metavar="TARGET", help="blocks that get them")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=POINTS_HELP)
-    parser.add_argument("--values", metavar="A,B,...", required=True, help="columns of SOURCE")
-    parser.add_argument(
+    group = parser.section("inputs")
+    group.add("map", metavar="M.npz", help="a map that `geounfold unfold --map` saved")
+    group.add("source", metavar="SOURCE", help=f"blocks that have values: {POINTS}")
+    group.add("target", metavar="TARGET", help="blocks that get values")
+    group.add("--values", metavar="A,B,...", required=True, help="columns of SOURCE to move")
+    group.add(
         "--to",
         metavar="SPACE",
         default="folded",
-        help="where TARGET lies: folded (default; SOURCE is then unfolded) or unfolded",
-    )
-    parser.add_argument(
-        "--split", metavar="N", default="4", help="parts of a block along each axis (default 4)"
-    )
-    add_frame(
-        parser,
-        "the folded blocks",
-        "how the folded blocks are turned, in degrees (default: measured; see below)",
+        help="space of TARGET: folded (default) or unfolded; SOURCE is in the other",
     )
     for side in ("source", "target"):
         name = side.upper()
-        parser.add_argument(
-            f"--{side}-sizes", metavar="X,Y,Z", help=f"columns, or lengths, of {name}'s sides"
+        group.add(f"--{side}-sizes", metavar="X,Y,Z", help=f"sides of {name}: columns or lengths")
+    for side in ("source", "target"):
+        group.add(
+            f"--{side}-columns",
+            metavar="A,B,C",
+            rare=True,
+            help=f"columns of {side.upper()}'s coordinates",
         )
-        parser.add_argument(
-            f"--{side}-columns", metavar="A,B,C", help=f"{name}'s coordinate columns"
-        )
-    parser.add_argument(
-        "--drop-invalid", action="store_true", help="leave out rows without finite coordinates"
+    group.add(
+        "--drop-invalid", action="store_true", rare=True, help="leave out rows without coordinates"
     )
-    parser.add_argument("--summary", metavar="S.json", help="totals, and blocks without a value")
+    add_frame(
+        group,
+        "the folded blocks",
+        "how the folded blocks are turned, in degrees (default: measured)",
+    )
+    group = parser.section("outputs")
+    group.add("-o", "--output", metavar="OUT", required=True, help="TARGET with the values")
+    group.add("--summary", metavar="S.json", help="sums, and blocks without a value")
+    group.add(
+        "--split", metavar="N", default="4", help="parts of a block along each axis (default 4)"
+    )
+    return parser

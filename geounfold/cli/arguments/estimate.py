@@ -2,64 +2,90 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from geounfold.cli.arguments.shared import FORMATS_HELP, POINTS_HELP, add_columns, add_command
+from geounfold.cli.arguments.groups import add_columns, add_command
+from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, joined
 
-_ESTIMATE = """\
-results, by the grade's column, say CU:
-  CU_estimate        at the block's centroid, as a point; empty where there is none
-  CU_variance        kriging variance, in the grade's unit squared
-  CU_samples         how many samples were found
-  CU_flag            estimated, too_few_samples, outside_map or unsolvable
+_RESULTS = """\
+results, for a grade CU:
+  CU_estimate      at the block's centroid, as a point; empty if there is none
+  CU_variance      kriging variance, in the grade's unit squared
+  CU_samples       number of samples used
+  CU_flag          estimated, too_few_samples, outside_map or unsolvable
 
-SAMPLES and BLOCKS are where they were drilled and mined: the map carries both. The variogram and
-the search hold in the unfolded space, whose first two axes lie in the layer and whose third lies
-across it. The summary holds the variogram, in the form that --variogram reads:
-  {"nugget": 0.1, "structures": [{"kind": "spherical", "sill": 0.9, "ranges": [150, 150, 20]}],
-   "rotation": [0, 0, 0]}
-kinds: spherical, exponential, gaussian; rotation: bearing, plunge and dip of the axes, degrees.
+SAMPLES and BLOCKS are in the folded space; the map carries both. The variogram
+and the search are in the unfolded space: the first two axes lie in the layer,
+the third across it. The summary holds the variogram as --variogram reads it:
+  {"nugget": 0.1, "rotation": [0, 0, 0], "structures":
+   [{"kind": "spherical", "sill": 0.9, "ranges": [150, 150, 20]}]}
+kinds: spherical, exponential, gaussian; rotation: bearing, plunge and dip of
+the axes, in degrees.
 
 Needs: pip install 'geounfold[geostat]'"""
 
+_EXAMPLES = (
+    "geounfold estimate m.npz samples.csv blocks.csv -o grades.csv --grade CU",
+    "geounfold estimate m.npz samples.csv blocks.csv -o grades.csv --grade CU \\\n"
+    "    --max-per-hole 6 --cross-validate --summary s.json",
+)
 
-def add_estimate(commands: Any, common: argparse.ArgumentParser) -> None:
+
+def add_estimate(commands: Any) -> Parser:
     """Add the command estimate and its arguments."""
-    summary = "estimate a grade on blocks from samples, in the unfolded space"
-    parser = add_command(commands, "estimate", summary, common, _ESTIMATE + FORMATS_HELP)
-    parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
-    parser.add_argument("samples", metavar="SAMPLES", help=f"composites: {POINTS_HELP}")
-    parser.add_argument("points", metavar="BLOCKS", help=f"block centroids: {POINTS_HELP}")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=POINTS_HELP)
-    parser.add_argument("--grade", metavar="NAME", required=True, help="the samples' column")
-    parser.add_argument("--hole", metavar="NAME", help="the column of hole names, if not found")
-    parser.add_argument(
-        "--method", metavar="M", default="ordinary", help="ordinary (default) or simple kriging, "
-        "or inverse_distance"
-    )  # fmt: skip
-    parser.add_argument(
-        "--variogram", metavar="V.json", help="a model, or a summary that holds one; fitted without"
+    parser = add_command(
+        commands,
+        "estimate",
+        "estimate a grade on blocks from samples, in the unfolded space",
+        details=joined(_RESULTS, POINT_FORMATS),
+        examples=_EXAMPLES,
     )
-    parser.add_argument(
-        "--radii", metavar="A,B,C", help="of the search; default twice the variogram's ranges"
+    group = parser.section("inputs")
+    group.add("map", metavar="M.npz", help="a map that `geounfold unfold --map` saved")
+    group.add("samples", metavar="SAMPLES", help=f"composites: {POINTS}")
+    group.add("points", metavar="BLOCKS", help=f"block centroids: {POINTS}")
+    group.add("--grade", metavar="NAME", required=True, help="column of SAMPLES to estimate")
+    group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
+    group.add(
+        "--samples-columns", metavar="A,B,C", rare=True, help="columns of SAMPLES' coordinates"
     )
-    parser.add_argument(
-        "--rotation", metavar="B,P,D", help="of the search: bearing, plunge, dip (default 0,0,0)"
-    )
-    parser.add_argument("--min-samples", metavar="N", help="fewest (default 4)")
-    parser.add_argument("--max-samples", metavar="N", help="most (default 24)")
-    parser.add_argument("--max-per-hole", metavar="N", help="most of one hole (default no limit)")
-    parser.add_argument("--mean", metavar="X", help="of simple kriging; the samples' without")
-    parser.add_argument("--power", metavar="X", default="2", help="of inverse distance (default 2)")
-    parser.add_argument("--workers", metavar="N", default="1", help="processes (default 1)")
-    parser.add_argument(
+    add_columns(group)
+    group = parser.section("outputs")
+    group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")
+    group.add("--summary", metavar="S.json", help="options, variogram, figures, warnings")
+    group.add(
         "--cross-validate",
         action="store_true",
-        help="tell in the summary how samples are estimated without their own hole",
+        help="in the summary: errors at samples that their own hole does not estimate",
     )
-    parser.add_argument("--summary", metavar="S.json", help="what ran, and how good it is")
-    parser.add_argument(
-        "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
+    group = parser.section("method")
+    group.add(
+        "--method",
+        metavar="M",
+        default="ordinary",
+        help="ordinary (default) or simple kriging, or inverse_distance",
     )
-    add_columns(parser)
+    group.add(
+        "--variogram",
+        metavar="V.json",
+        help="a model, or a summary that holds one (default: fitted)",
+    )
+    group.add("--mean", metavar="X", help="mean for simple kriging (default: that of SAMPLES)")
+    group.add("--power", metavar="X", default="2", help="power of inverse distance (default 2)")
+    group.add("--workers", metavar="N", default="1", help="number of processes (default 1)")
+    group = parser.section("search")
+    group.add(
+        "--radii",
+        metavar="A,B,C",
+        help="radii of the search (default twice the variogram's ranges)",
+    )
+    group.add(
+        "--rotation",
+        metavar="B,P,D",
+        help="bearing, plunge and dip of the search, in degrees (default 0,0,0)",
+    )
+    group.add("--min-samples", metavar="N", help="fewest samples of an estimate (default 4)")
+    group.add("--max-samples", metavar="N", help="most samples of an estimate (default 24)")
+    group.add("--max-per-hole", metavar="N", help="most samples of one hole (default: no limit)")
+    return parser

@@ -2,70 +2,72 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from geounfold.cli.arguments.shared import (
-    ANGLES_HELP,
-    FORMATS_HELP,
-    HOLES_HELP,
-    POINTS_HELP,
-    RESULTS_HELP,
-    add_columns,
-    add_command,
-    add_frame,
-    add_holes,
+from geounfold.cli.arguments.groups import add_columns, add_command, add_frame, add_holes
+from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.texts import ANGLES, FORMATS, HOLES, KEPT_ROWS, POINTS, RESULTS, joined
+
+_INVERSE = """\
+with --inverse:
+  folded_x, folded_y, folded_z
+                   coordinates with the folds put back
+  location, mesh_distance
+                   as above, in the unfolded space
+  Columns unfolded_x/y/z are read before other coordinates."""
+
+_USAGE = """\
+%(prog)s M.npz POINTS -o OUT [options]
+       %(prog)s M.npz --holes COLLAR SURVEY ASSAY --samples-out Q [options]"""
+
+_EXAMPLES = (
+    "geounfold map m.npz wireframe.ply -o wireframe_flat.ply",
+    "geounfold map m.npz grid.csv --inverse -o grid_folded.csv",
 )
-
-_MAP = (
-    RESULTS_HELP
-    + """\
-with --inverse (columns unfolded_x/y/z are taken first where they exist):
-  folded_x, folded_y, folded_z         coordinates with the folds put back
-  location, mesh_distance               as above, in the unfolded space
-
-Every input column and row comes back in order. An input column called as a result is replaced
-in its place.
-
-"""
-    + ANGLES_HELP
-)
-
 
 ENGINES = ("local", "dask")
 
 
-def add_map(commands: Any, common: argparse.ArgumentParser, *, holes: bool) -> None:
-    """Add the command map and its arguments."""
-    summary = "carry other points or drill-holes with a saved map"
-    parser = add_command(commands, "map", summary, common, _MAP + HOLES_HELP + FORMATS_HELP)
-    parser.add_argument("map", metavar="M.npz", help="a map saved by `geounfold unfold --map`")
-    # An optional POINTS would be missed behind an option, so it is there or it is not.
+def add_map(commands: Any, *, holes: bool) -> Parser:
+    """Add the command map and its arguments; with `holes`, it takes these instead of POINTS."""
+    parser = add_command(
+        commands,
+        "map",
+        "carry samples, drill-holes or wireframes with a saved map",
+        usage=_USAGE,
+        details=joined(RESULTS, _INVERSE, KEPT_ROWS, ANGLES, HOLES, FORMATS),
+        examples=_EXAMPLES,
+    )
+    group = parser.section("points")
+    group.add("map", metavar="M.npz", help="a map that `geounfold unfold --map` saved")
+    # argparse does not find an optional POINTS behind an option, so POINTS is needed or absent.
     if holes:
         parser.set_defaults(points=None)
     else:
-        parser.add_argument(
-            "points", metavar="POINTS", help=f"{POINTS_HELP}; or a surface; or give --holes instead"
-        )
-    parser.add_argument(
+        group.add("points", metavar="POINTS", help=f"{POINTS}; or a surface")
+    group.add(
         "-o",
         "--output",
         metavar="OUT",
-        help=f"where POINTS go: {POINTS_HELP}; a surface as a mesh file keeps its triangles",
+        help="the carried POINTS; a surface as a mesh file keeps its triangles",
     )
-    parser.add_argument("--inverse", action="store_true", help="from unfolded to folded")
-    parser.add_argument(
+    group.add("--inverse", action="store_true", help="from the unfolded to the folded space")
+    add_columns(group)
+    add_frame(group, "POINTS")
+    group = parser.section("drill-holes, instead of POINTS")
+    add_holes(group)
+    group.add("--samples-out", metavar="Q", help="the carried samples")
+    group = parser.section("large tables")
+    group.add(
         "--engine",
         choices=ENGINES,
         default=ENGINES[0],
-        help="local (default): this process; dask: POINTS, a .parquet or .csv file or a folder of "
-        "them, is carried in parts by a cluster, and OUT becomes a folder of such parts",
+        help="local (default): this process; dask: a cluster carries POINTS, a table or a folder "
+        "of tables, into a folder OUT",
     )
-    parser.add_argument(
+    group.add(
         "--scheduler",
         metavar="ADDRESS",
-        help="of a running Dask cluster, such as tcp://host:8786; without, this machine's cores",
+        help="a running Dask cluster, such as tcp://host:8786 (default: this machine's cores)",
     )
-    add_frame(parser, "POINTS")
-    add_columns(parser)
-    add_holes(parser).add_argument("--samples-out", metavar="Q", help="where samples go")
+    return parser

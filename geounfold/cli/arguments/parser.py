@@ -1,20 +1,18 @@
-"""The commands and their options.
-
-Options of the unfolding have no defaults here: what is not given is left to `UnfoldOptions`,
-which checks what is given and lists the valid values.
-"""
+"""The parser of the whole command line: every command and its options."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 
 from geounfold import _version
 from geounfold.cli.arguments.blocks import add_grid, add_transfer
 from geounfold.cli.arguments.compare import add_compare, add_crosscheck, add_quality
 from geounfold.cli.arguments.estimate import add_estimate
+from geounfold.cli.arguments.groups import add_common
+from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.map import add_map
-from geounfold.cli.arguments.shared import EXIT_STATUS, Parser, common_arguments
 from geounfold.cli.arguments.tools import (
     add_completion,
     add_doctor,
@@ -24,24 +22,37 @@ from geounfold.cli.arguments.tools import (
 )
 from geounfold.cli.arguments.unfold import add_unfold
 
+_EXAMPLES = ("geounfold unfold --help", "geounfold unfold blocks.csv -o flat.csv --report r.html")
+
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return the parsed arguments; `handler` names the command's function, `words` is argv.
+    """Return the parsed arguments.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        The words after ``geounfold``. Without any, the commands are printed.
+
+    Returns
+    -------
+    Namespace
+        The options; ``command`` is the command's name, ``words`` is `argv`.
 
     Raises
     ------
     OptionError
-        Unknown commands, options or values, or ones that are missing.
+        An unknown command, option or value, or one that is missing.
     SystemExit
-        After ``--help`` and ``--version``, with status 0.
+        After a help and ``--version``, with status 0.
     """
-    args = build_parser(holes="--holes" in argv).parse_args(_joined(argv))
+    words = list(argv) or ["--help"]
+    args = build_parser(holes="--holes" in words).parse_args(_joined(words))
     args.words = list(argv)
     return args
 
 
 def _joined(argv: Sequence[str]) -> list[str]:
-    """Return arguments with ``--up -1,0,0`` as one, which argparse takes for an option else."""
+    """Return arguments with ``--up -1,0,0`` as one word, which argparse takes for a flag else."""
     joined: list[str] = []
     for word in argv:
         if joined and joined[-1] == "--up" and word[:1] == "-":
@@ -56,22 +67,17 @@ def build_parser(*, holes: bool = False) -> Parser:
     parser = Parser(
         prog="geounfold",
         description="Takes the folds out of an ore body, and puts them back.",
-        epilog=EXIT_STATUS,
+        examples=_EXAMPLES,
     )
-    parser.add_argument("--version", action="version", version=f"geounfold {_version.__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    common = common_arguments()
-    add_unfold(commands, common)
-    add_map(commands, common, holes=holes)
-    add_estimate(commands, common)
-    add_compare(commands, common)
-    add_crosscheck(commands, common)
-    add_quality(commands, common)
-    add_simulate(commands, common)
-    add_view(commands, common)
-    add_grid(commands, common)
-    add_transfer(commands, common)
-    add_init(commands, common)
-    add_doctor(commands, common)
-    add_completion(commands, common)
+    commands = parser.commands()
+    for add in (
+        *(add_unfold, partial(add_map, holes=holes), add_estimate),
+        *(add_compare, add_crosscheck, add_quality, add_simulate, add_view),
+        *(add_grid, add_transfer, add_init, add_doctor, add_completion),
+    ):
+        add_common(add(commands))
+    options = parser.section("options")
+    options.add("-h", "--help", action="help", help="print the commands")
+    version = f"geounfold {_version.__version__}"
+    options.add("--version", action="version", version=version, help="print the version")
     return parser

@@ -2,81 +2,111 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from geounfold.cli.arguments.shared import TABLES_HELP, add_columns, add_command
+from geounfold.cli.arguments.groups import add_columns, add_command
+from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS
 
 _SIMULATE = """\
-columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z before folding, in
-metres, to four decimals. The same case gives the same file."""
-
+columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z
+before folding, in metres, to four decimals. The same case gives the same file."""
 
 _DOCTOR = """\
-The exit status is 1 where a library that geounfold needs is missing, is of a version it was not
-made for, or does not work. Libraries of extras may be missing."""
+The exit status is 1 if a library that geounfold needs is missing, has another
+version than geounfold needs, or does not work. Libraries of extras may be
+missing."""
 
-
-_COMPLETION = """\
-bash:  geounfold completion bash > ~/.local/share/bash-completion/completions/geounfold
-zsh:   geounfold completion zsh > ~/.zsh/_geounfold    (a folder in fpath)
-tcsh:  geounfold completion tcsh > ~/.geounfold.csh    (and source it from ~/.tcshrc)
-
-Needs: pip install 'geounfold[completion]'"""
-
+_COMPLETION = "Needs: pip install 'geounfold[completion]'"
 
 SHELLS = ("bash", "zsh", "tcsh")
 
 
-def add_simulate(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_simulate(commands: Any) -> Parser:
     """Add the command simulate and its arguments."""
     parser = add_command(
-        commands, "simulate", "make a simulated folded body with its exact truth", common, _SIMULATE
+        commands,
+        "simulate",
+        "make a simulated folded body, with its exact truth",
+        details=_SIMULATE,
+        examples=("geounfold simulate --list", "geounfold simulate plunging -o blocks.csv"),
     )
-    parser.add_argument("case", metavar="CASE", nargs="?", help="which one")
-    parser.add_argument("--list", action="store_true", help="list the cases and what they are")
-    parser.add_argument("-o", "--output", metavar="OUT", help=TABLES_HELP)
-    parser.add_argument(
-        "--blocks", metavar="N", help="grow or shrink the body in its plane to about N blocks"
-    )
+    group = parser.section("body")
+    group.add("case", metavar="CASE", nargs="?", help="the body's name")
+    group.add("--list", action="store_true", help="list the bodies, one line each")
+    group.add("-o", "--output", metavar="OUT", help=f"the blocks: {POINTS}")
+    group.add("--blocks", metavar="N", help="scale the body in its plane to about N blocks")
+    return parser
 
 
-def add_view(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_view(commands: Any) -> Parser:
     """Add the command view and its arguments."""
-    parser = add_command(commands, "view", "draw points or a saved map into a picture", common)
-    parser.add_argument(
+    parser = add_command(
+        commands,
+        "view",
+        "draw points or a saved map into a picture",
+        details=POINT_FORMATS,
+        examples=(
+            "geounfold view flat.csv -o flat.png",
+            "geounfold view flat.csv -o shear.png --colour shear",
+        ),
+    )
+    group = parser.section("picture")
+    group.add(
         "points",
         metavar="FILE",
-        help=f"{TABLES_HELP}, or a map .npz; a table that has unfolded_x/y/z or true_x/y/z too is "
+        help=f"points: {POINTS}; or a map .npz. A table with unfolded_x/y/z or true_x/y/z too is "
         "drawn in both spaces",
     )
-    parser.add_argument("-o", "--output", metavar="PICTURE.png", required=True)
-    parser.add_argument(
+    group.add("-o", "--output", metavar="PICTURE.png", required=True, help="the picture")
+    group.add(
         "--colour",
         metavar="COLUMN",
-        help="colour by a column of numbers (default stratigraphic, or height)",
+        help="column of numbers that colours the points (default: stratigraphic, or height)",
     )
-    add_columns(parser)
+    add_columns(group)
+    return parser
 
 
-def add_init(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_init(commands: Any) -> Parser:
     """Add the command init and its arguments."""
     parser = add_command(
-        commands, "init", "write all options, with their defaults and what they do", common
+        commands,
+        "init",
+        "write all options of the unfolding, with defaults and meanings",
+        examples=(
+            "geounfold init -o options.toml",
+            "geounfold unfold blocks.csv -o flat.csv --config options.toml",
+        ),
     )
-    parser.add_argument(
-        "-o", "--output", metavar="C.toml", help="for --config; without, they go to stdout"
-    )
+    group = parser.section("output")
+    group.add("-o", "--output", metavar="C.toml", help="file for --config (default: stdout)")
+    return parser
 
 
-def add_doctor(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_doctor(commands: Any) -> Parser:
     """Add the command doctor and its arguments."""
-    add_command(commands, "doctor", "tell what is installed, and whether it works", common, _DOCTOR)
+    return add_command(
+        commands,
+        "doctor",
+        "show what is installed, and whether it works",
+        details=_DOCTOR,
+        examples=("geounfold doctor", "geounfold doctor --json"),
+    )
 
 
-def add_completion(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_completion(commands: Any) -> Parser:
     """Add the command completion and its arguments."""
     parser = add_command(
-        commands, "completion", "print a script that makes a shell complete", common, _COMPLETION
+        commands,
+        "completion",
+        "print a script that lets a shell complete commands",
+        details=_COMPLETION,
+        examples=(
+            "geounfold completion bash > ~/.geounfold.bash     # source it from ~/.bashrc",
+            "geounfold completion zsh > ~/.zsh/_geounfold      # a folder in fpath",
+            "geounfold completion tcsh > ~/.geounfold.csh      # source it from ~/.tcshrc",
+        ),
     )
-    parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    parser.section("shell").add("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    return parser

@@ -5,78 +5,86 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from geounfold.cli.arguments.shared import (
-    ANGLES_HELP,
-    FORMATS_HELP,
-    HOLES_HELP,
-    POINTS_HELP,
-    RESULTS_HELP,
+from geounfold.cli.arguments.groups import (
     add_columns,
     add_command,
     add_frame,
     add_holes,
-    add_model,
+    add_method,
+)
+from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.texts import ANGLES, FORMATS, HOLES, KEPT_ROWS, POINTS, RESULTS, joined
+
+_DISTORTION = """\
+  volume_ratio, nmd_error, stretch_min, stretch_max, shear
+                   distortion of each block
+  block_volume, unfolded_volume
+                   if the blocks' sides are known: from --sizes, or from
+                   columns called XINC, dx, size_x or alike"""
+
+_EXAMPLES = (
+    "geounfold unfold blocks.csv -o flat.csv --summary s.json --report r.html",
+    "geounfold unfold blocks.csv -o flat.csv --map m.npz \\\n"
+    "    --holes collar.csv survey.csv assay.csv --composite 2 --samples-out q.csv",
 )
 
-_UNFOLD = (
-    RESULTS_HELP
-    + """\
-  volume_ratio, nmd_error, stretch_min, stretch_max, shear   distortion of each block
-  block_volume, unfolded_volume   where the blocks' sides are known (see --sizes)
 
-Every input column and row comes back in order. An input column called as a result is replaced
-in its place. Output tables are separated by commas, whatever the input's separator.
-
-"""
-    + ANGLES_HELP
-)
-
-
-def add_unfold(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_unfold(commands: Any) -> Parser:
     """Add the command unfold and its arguments."""
     parser = add_command(
-        commands, "unfold", "unfold a body", common, _UNFOLD + HOLES_HELP + FORMATS_HELP
+        commands,
+        "unfold",
+        "take the folds out of an ore body",
+        details=joined(f"{RESULTS}\n{_DISTORTION}", KEPT_ROWS, ANGLES, HOLES, FORMATS),
+        examples=_EXAMPLES,
     )
-    parser.add_argument("points", metavar="POINTS", help=f"block centroids: {POINTS_HELP}")
-    parser.add_argument("-o", "--output", metavar="OUT", required=True, help=POINTS_HELP)
-    parser.add_argument("--summary", metavar="S.json", help="what ran and how good it is")
-    parser.add_argument("--map", metavar="M.npz", help="the map, for `geounfold map`")
-    parser.add_argument("--report", metavar="R.html", help="verdict, 3-D views, figures")
-    parser.add_argument(
-        "--mesh", metavar="C.vtu", help="the control mesh in both spaces, flaws marked"
-    )
-    parser.add_argument(
+    group = parser.section("body")
+    group.add("points", metavar="POINTS", help=f"block centroids: {POINTS}")
+    add_columns(group)
+    group.add(
         "--sizes",
         metavar="X,Y,Z",
-        help="sides of the blocks, for their volumes: three columns (XINC, dx and alike are "
-        "found) or lengths",
+        help="sides of a block, for volumes: columns or lengths",
     )
-    add_frame(parser, "POINTS")
-    parser.add_argument("--samples", metavar="P", help=f"other points to carry: {POINTS_HELP}")
-    parser.add_argument("--samples-out", metavar="Q", help="where they, or the holes' samples, go")
-    parser.add_argument(
-        "--samples-columns", metavar="A,B,C", help="their coordinate columns, as --columns"
+    group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
+    group.add("--bottom", metavar="B", help="the bottom surface")
+    add_frame(group, "POINTS")
+    group = parser.section("outputs")
+    group.add("-o", "--output", metavar="OUT", required=True, help=f"the result: {POINTS}")
+    group.add("--summary", metavar="S.json", help="options, figures, proof, warnings, seconds")
+    group.add("--map", metavar="M.npz", help="the map, for `geounfold map`")
+    group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
+    group.add(
+        "--mesh", metavar="C.vtu", rare=True, help="the control mesh in both spaces, flaws marked"
     )
-    parser.add_argument(
+    group = parser.section("samples and drill-holes")
+    group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")
+    group.add("--samples-out", metavar="Q", help="the carried samples, loose or of drill-holes")
+    group.add(
+        "--samples-columns",
+        metavar="A,B,C",
+        rare=True,
+        help="columns of the samples' coordinates, as --columns",
+    )
+    add_holes(group)
+    group.add(
         "--grade",
         metavar="NAME",
-        help="a column of the samples or assays to explore in the report: histogram, layers, "
-        "variograms in both spaces, swaths, contacts",
+        help="column of samples or assays that the report explores",
     )
-    parser.add_argument(
-        "--top", metavar="T", help="the top surface: a mesh file or a table (see below)"
-    )
-    parser.add_argument("--bottom", metavar="B", help="the bottom surface")
-    parser.add_argument(
-        "--crosscheck",
-        action="store_true",
-        help="check the control mesh against others of its border, in summary and report",
-    )
-    add_columns(parser)
-    add_holes(parser)
-    add_model(parser).add_argument(
+    group = parser.section("method")
+    add_method(group)
+    group = parser.section("checks")
+    group.add(
         "--allow-uncertified",
         action=argparse.BooleanOptionalAction,
         default=argparse.SUPPRESS,
-        help="write the answer, marked, even where the map is not proved one-to-one",
+        help="write a result that is not proved one-to-one; it is marked",
     )
+    group.add(
+        "--crosscheck",
+        action="store_true",
+        rare=True,
+        help="compare the control mesh with other meshes of its border",
+    )
+    return parser

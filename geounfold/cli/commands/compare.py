@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats, TriMesh
 
 
-def compare(args: Namespace, console: Console) -> None:
-    """Try flatteners on one body or surface and write a table of how they did."""
+def run(args: Namespace, console: Console) -> None:
+    """Run flatteners on one surface or methods on one body, and write a table of figures."""
     outputs = Outputs.planned(
         {"--output": (args.output, TABLE_ENDINGS)},
         files_given(args.points, args.truth, config_file(args)),
@@ -30,7 +30,7 @@ def compare(args: Namespace, console: Console) -> None:
     if args.methods is not None:
         how["methods"] = listed(args.methods)
     elif args.truth is not None:
-        raise OptionError("--truth is compared with unfolded blocks: give --methods too")
+        raise OptionError("--truth needs --methods: it is compared with unfolded blocks")
     if holds_surface(args.points):
         given: TriMesh | Floats = read_surface(args.points)
         _refuse_model_options(args)
@@ -59,19 +59,19 @@ def compare(args: Namespace, console: Console) -> None:
 
 
 def _truth(args: Namespace, count: int, console: Console) -> Floats:
-    """Read where the blocks truly lay, row by row."""
+    """Return the blocks' coordinates before folding, (n, 3), row by row."""
     console.stage(f"reading {args.truth}")
     truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,))
     if len(truth) != count:
         raise InputError(
-            f"{args.truth}: has {len(truth)} rows, but {args.points} has {count}; rows must belong "
-            "together one by one"
+            f"{args.truth}: has {len(truth)} rows, but {args.points} has {count}; row i of both "
+            "must be the same point"
         )
     return truth.points
 
 
 def _refuse_model_options(args: Namespace) -> None:
-    """Raise where options that shape a body's surfaces are given beside a surface."""
+    """Raise OptionError if an option of a body is given for one surface."""
     given = [f"--{name}" for name in (*MODEL_OPTIONS, "config") if hasattr(args, name)]
     if given:
         raise OptionError(f"{given[0]} needs a table of points; {args.points} is one surface")

@@ -6,16 +6,21 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from geounfold.cli.file_endings import JSON, POINTS_OUT
+from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
 from geounfold.cli.inputs.points import files_given, read
-from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
+from geounfold.cli.inputs.unfold_options import (
+    command_line,
+    config_file,
+    flagged,
+    unfold_options,
+)
 from geounfold.cli.terminal.console import Console
 from geounfold.io import Outputs, write_json
 from geounfold.io.paths import TABLE_ENDINGS, ending
 from geounfold.io.tables.files import write_table
 
 
-def crosscheck(args: Namespace, console: Console) -> None:
+def run(args: Namespace, console: Console) -> None:
     """Unfold a body and check its control mesh against other meshes of the same border."""
     outputs = Outputs.planned(
         {
@@ -31,7 +36,7 @@ def crosscheck(args: Namespace, console: Console) -> None:
         table.check_writable(args.differences)
     from geounfold.cli.answers.figures import crosscheck_lines
     from geounfold.comparison import crosscheck
-    from geounfold.unfolding import run
+    from geounfold.unfolding import run as unfolding
 
     given = {"meshers": args.meshers, "interiors": args.interiors}
     named: dict[str, Any] = {
@@ -39,8 +44,8 @@ def crosscheck(args: Namespace, console: Console) -> None:
         for name, words in given.items()
         if words is not None
     }
-    chosen = crosscheck.CrossCheckOptions(**named)
-    result = run.unfold(table.points, unfold_options(args), progress=console.stage)
+    chosen = flagged(lambda values: crosscheck.CrossCheckOptions(**values), named)
+    result = unfolding.unfold(table.points, unfold_options(args), progress=console.stage)
     check = crosscheck.crosscheck(result, chosen, progress=console.stage)
     facts = {**check.as_dict(), "input": table.facts(), "command": command_line(args)}
     console.stage("writing")

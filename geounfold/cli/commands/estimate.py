@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from geounfold.cli.file_endings import JSON, POINTS_OUT
+from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
 from geounfold.cli.inputs.points import files_given, read, read_samples
 from geounfold.cli.inputs.unfold_options import command_line
 from geounfold.cli.terminal.console import Console
@@ -14,7 +14,7 @@ from geounfold.io import Outputs, write_json
 from geounfold.io.paths import existing_file
 
 
-def estimate(args: Namespace, console: Console) -> None:
+def run(args: Namespace, console: Console) -> None:
     """Estimate a grade on blocks from samples, in the unfolded space of a saved map."""
     from geounfold.cli.inputs.estimation import estimation, summarised
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.cli.answers.locations import flat_columns, place_counts, warn_of_outside
-from geounfold.cli.file_endings import POINTS_OUT, SURFACES_OUT
-from geounfold.cli.inputs.drillholes import TRACE_ENDINGS, check_hole_options, read_holes
+from geounfold.cli.answers.file_endings import POINTS_OUT, SURFACES_OUT, TRACES
+from geounfold.cli.answers.locations import flat_columns, outside_warnings, place_counts
+from geounfold.cli.inputs.drillholes import check_hole_options, read_holes
 from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import files_given, open_table, triple
 from geounfold.cli.terminal.console import Console
@@ -26,32 +26,24 @@ if TYPE_CHECKING:
 
     from geounfold.body.model_frame import ModelFrame
     from geounfold.geometry.mesh import Floats
+    from geounfold.mapping.mesh_map import UnfoldingMap
 
 
-def carry(args: Namespace, console: Console) -> None:
-    """Carry other points with a saved map, to the flat side or back; or drill-holes."""
+def run(args: Namespace, console: Console) -> None:
+    """Carry points, a wireframe or drill-holes with a saved map; points also back."""
     check_hole_options(args)
-    if (args.points is None) != (args.output is None):
-        raise OptionError(
-            "map needs POINTS and -o OUT, or --holes with --samples-out or --traces-out"
-        )
-    if args.holes is None and args.samples_out is not None:
-        raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    _check_options(args)
     frame = model_frame(args)
     if frame is not None and (args.points is None or args.inverse):
-        raise OptionError("--origin is that of POINTS in the folded space: without --inverse")
+        raise OptionError("--origin needs POINTS in the folded space, without --inverse")
     if args.engine == "dask":
         _carry_on_cluster(args, frame, console)
         return
-    if args.scheduler is not None:
-        raise OptionError("--scheduler needs --engine dask")
-    if args.holes is not None and args.inverse:
-        raise OptionError("--holes are where they were drilled: without --inverse")
     outputs = Outputs.planned(
         {
             "--output": (args.output, (*POINTS_OUT, *SURFACES_OUT)),
             "--samples-out": (args.samples_out, POINTS_OUT),
-            "--traces-out": (args.traces_out, TRACE_ENDINGS),
+            "--traces-out": (args.traces_out, TRACES),
         },
         files_given(args.map, args.points, *(args.holes or ())),
         overwrite=args.overwrite,
@@ -60,56 +52,91 @@ def carry(args: Namespace, console: Console) -> None:
     existing_file(Path(args.map))
     if args.points is not None and _is_wireframe(args):
         _carry_surface(args, frame, console, outputs)
-        return
-    prefer = (UNFOLDED,) if args.inverse else ()
-    table = (
-        None
-        if args.points is None
-        else open_table(args, console, args.output, prefer, frame=frame, keep=False)
-    )
+    else:
+        _carry_points(args, frame, console, outputs)
+
+
+def _check_options(args: Namespace) -> None:
+    """Raise OptionError if options contradict each other."""
+    if (args.points is None) != (args.output is None):
+        raise OptionError(
+            "map needs POINTS and -o OUT, or --holes with --samples-out or --traces-out"
+        )
+    if args.holes is None and args.samples_out is not None:
+        raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
+    if args.engine == "dask" and (args.points is None or args.holes is not None):
+        raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
+    if args.engine != "dask" and args.scheduler is not None:
+        raise OptionError("--scheduler needs --engine dask")
+    if args.holes is not None and args.inverse:
+        raise OptionError("--holes are in the folded space: without --inverse")
+
+
+def _carry_points(
+    args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
+) -> None:
+    """Carry a table, drill-holes, or both."""
+    table = None
+    if args.points is not None:
+        prefer = (UNFOLDED,) if args.inverse else ()
+        table = open_table(args, console, prefer, frame=frame, keep=False)
     holes = read_holes(args, console)
     from geounfold.mapping import mesh_map
 
     saved = mesh_map.load(args.map)
     console.stage("carrying points")
-    names = FOLDED if args.inverse else UNFOLDED
-    places: Counter[str] = Counter()
-    unsolved: list[int] = []
-
-    def carried(_: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
-        there = saved.carry(points, inverse=args.inverse)
-        found = result_columns(names, there)
-        places.update(place_counts(found))
-        unsolved.append(there.unsolved if args.inverse else 0)
-        return found if frame is None else {**world_columns(points), **found}
-
+    carrying = _Carrying(saved, frame, inverse=args.inverse)
     traced = {} if holes is None else holes.carried(flat_columns(saved))
     with outputs.writing() as parts:
         if table is not None:
-            table.write_parts(parts["--output"], carried)
+            table.write_parts(parts["--output"], carrying.columns)
         if holes is not None:
             holes.write(parts, traced)
-    named = {name: place_counts(found) for name, found in traced.items() if found}
+    counts = {name: place_counts(found) for name, found in traced.items() if found}
+    warnings = []
     if table is not None:
-        named = {"points": dict(places), **named}
-        warn_of_outside(args.points, named["points"], console)
-    if sum(unsolved):
-        console.warn(
-            f"{args.points}: {sum(unsolved)} points lie inside the control mesh, but the inverse "
-            f"of its {saved.coordinates} coordinates was not found there; they were left empty too"
-        )
+        counts = {"points": dict(carrying.counts), **counts}
+        warnings = outside_warnings(args.points, counts["points"])
+        warnings += carrying.unsolved_warnings(args.points)
     for name in traced:
-        warn_of_outside(f"the holes' {name}", named[name], console)
-    written = {args.output: named.get("points"), args.samples_out: named.get("samples")}
-    counts = [f"{c['carried']} points carried into {p}" for p, c in written.items() if c]
-    console.done(", ".join(counts) or f"traces carried into {args.traces_out}")
-    console.answer(named)
+        warnings += outside_warnings(f"the holes' {name}", counts[name])
+    for warning in warnings:
+        console.warn(warning)
+    written = {args.output: counts.get("points"), args.samples_out: counts.get("samples")}
+    done = [f"{c['carried']} points carried into {path}" for path, c in written.items() if c]
+    console.done(", ".join(done) or f"traces carried into {args.traces_out}")
+    console.answer(counts)
+
+
+class _Carrying:
+    """Output columns of points, batch by batch, and counts over all batches."""
+
+    def __init__(self, saved: UnfoldingMap, frame: ModelFrame | None, *, inverse: bool) -> None:
+        self._saved, self._frame, self._inverse = saved, frame, inverse
+        self.counts: Counter[str] = Counter()
+        self._unsolved = 0
+
+    def columns(self, _: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
+        """Return the output columns of a batch of points."""
+        carried = self._saved.carry(points, inverse=self._inverse)
+        found = result_columns(FOLDED if self._inverse else UNFOLDED, carried)
+        self.counts.update(place_counts(found))
+        self._unsolved += carried.unsolved if self._inverse else 0
+        return found if self._frame is None else {**world_columns(points), **found}
+
+    def unsolved_warnings(self, source: str) -> list[str]:
+        """Return the warning of points in the control mesh without an inverse."""
+        if not self._unsolved:
+            return []
+        return [
+            f"{source}: {self._unsolved} points lie inside the control mesh, but the inverse "
+            f"of its {self._saved.coordinates} coordinates was not found there; they were left "
+            "empty too"
+        ]
 
 
 def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Console) -> None:
     """Carry a table in parts by a Dask cluster, into a folder of parts."""
-    if args.points is None or args.holes is not None:
-        raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
     kind = ending(Path(args.output))
     if kind not in (".csv", ".parquet"):
         raise OptionError(
@@ -134,13 +161,14 @@ def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Consol
     dropped = found.pop("dropped")
     if dropped:
         console.warn(f"{args.points}: {dropped} rows without finite coordinates were left out")
-    warn_of_outside(args.points, found, console)
+    for warning in outside_warnings(args.points, found):
+        console.warn(warning)
     console.done(f"{found['carried']} points carried into {args.output}, {len(parts)} parts")
     console.answer({"points": found, "parts": len(parts)})
 
 
 def _is_wireframe(args: Namespace) -> bool:
-    """Return whether `map` is to write a surface: as the output's ending, and both files, say."""
+    """Return whether a surface is written: by the ending of OUT, or by those of both files."""
     kind = ending(Path(args.output))
     if kind not in SURFACES_OUT:
         return False
@@ -167,7 +195,8 @@ def _carry_surface(
         )
     with outputs.writing() as parts:
         write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
-    places = place_counts(result_columns(UNFOLDED, carried))
-    warn_of_outside(args.points, places, console)
+    counts = place_counts(result_columns(UNFOLDED, carried))
+    for warning in outside_warnings(args.points, counts):
+        console.warn(warning)
     console.done(f"{len(mesh.V)} vertices carried into {args.output}")
-    console.answer({"vertices": places})
+    console.answer({"vertices": counts})

@@ -5,17 +5,17 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from geounfold.cli.file_endings import JSON
+from geounfold.cli.answers.file_endings import JSON
+from geounfold.cli.inputs.numbers import whole_number
 from geounfold.cli.inputs.points import TRUE, files_given, triple
-from geounfold.cli.inputs.unfold_options import whole_number
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError
 from geounfold.io import Outputs, read_points, write_json
 from geounfold.io.result_columns import UNFOLDED
 
 
-def quality(args: Namespace, console: Console) -> None:
-    """Print how well an unfolding keeps distances, and how far from a truth it is."""
+def run(args: Namespace, console: Console) -> None:
+    """Print how well an unfolding keeps distances, and its distance from a truth."""
     outputs = Outputs.planned(
         {"--output": (args.output, JSON)},
         files_given(args.folded, args.unfolded, args.truth),
@@ -31,7 +31,7 @@ def quality(args: Namespace, console: Console) -> None:
         if other is not None and len(other) != len(folded):
             raise InputError(
                 f"{other.source}: has {len(other)} rows, but {folded.source} has {len(folded)}; "
-                "rows must belong together one by one"
+                "row i of both must be the same point"
             )
     from geounfold.cli.answers.figures import quality_figures
 
@@ -50,7 +50,7 @@ def quality(args: Namespace, console: Console) -> None:
 
 
 def _figure_lines(figures: dict[str, Any]) -> list[str]:
-    """Return figures as aligned lines, groups of statistics as a table below the others."""
+    """Return single figures as aligned lines, and statistics as a table below them."""
     width = max(map(len, figures))
     groups = {name: value for name, value in figures.items() if isinstance(value, dict)}
     plain = {name: value for name, value in figures.items() if name not in groups}
@@ -65,7 +65,7 @@ def _figure_lines(figures: dict[str, Any]) -> list[str]:
 
 
 def _figure(value: Any) -> str:
-    """Return a figure to six digits; several one after the other; a dash for none."""
+    """Return a figure with six digits, a list of them, or a dash for None."""
     if isinstance(value, tuple | list):
         return "  ".join(map(_figure, value))
     if value is None:

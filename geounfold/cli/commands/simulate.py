@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from geounfold.cli.file_endings import POINTS_OUT
-from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.cli.answers.file_endings import POINTS_OUT
+from geounfold.cli.inputs.numbers import whole_number
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import OptionError
 from geounfold.io import Outputs
 from geounfold.io.tables.files import write_table
 
 
-def simulate(args: Namespace, console: Console) -> None:
-    """List the simulated bodies, or write one with its truth."""
+def run(args: Namespace, console: Console) -> None:
+    """Print the names of the simulated bodies, or write one of them with its truth."""
     from geounfold import synthetic
 
     if args.list:
         if args.case is not None or args.output is not None:
-            raise OptionError("--list stands alone: it neither takes a CASE nor writes a file")
+            raise OptionError("--list has neither CASE nor -o: it prints the names of all cases")
         cases = {name: case.description for name, case in synthetic.CASES.items()}
         console.answer({"cases": cases}, lambda: _lined_up(cases))
         return

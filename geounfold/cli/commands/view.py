@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geounfold.cli.file_endings import MAP, PICTURE
+from geounfold.cli.answers.file_endings import MAP, PICTURE
 from geounfold.cli.inputs.points import TRUE, read
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from geounfold.geometry.mesh import Bools
 
 
-def view(args: Namespace, console: Console) -> None:
-    """Draw a saved map's control mesh, or points: folded and unfolded where a table has both."""
+def run(args: Namespace, console: Console) -> None:
+    """Draw a saved map's control mesh, or points; in both spaces if the table has both."""
     outputs = Outputs.planned(
         {"--output": (args.output, PICTURE)},
         [args.points],
@@ -83,11 +83,11 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
 
 
 def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:
-    """Return blocks' sides for what draws them; nothing where all are alike, or unknown."""
+    """Return the keyword of the blocks' sides; empty if all are equal, or unknown."""
     from geounfold.io.block_sizes import Sides, size_columns
     from geounfold.report.blocks import block_shape, level_sides
 
-    with suppress(InputError):  # several sets of columns: none is taken unasked
+    with suppress(InputError):  # several sets of columns: the user names none
         found = size_columns([str(name) for name in table.frame.columns])
         if found is not None:
             sides = Sides(found).of(table.frame)[there]
@@ -98,13 +98,13 @@ def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:
 
 
 def _with_image(table: PointTable) -> Bools:
-    """Return which rows of a table do not lie outside the reach of the map that carried them."""
+    """Return which rows have an image: their location is not outside the map's reach, (n,)."""
     if "location" not in table.frame.columns:
         return np.ones(len(table), dtype=bool)
     return np.asarray(table.frame["location"].astype(str) != "outside", dtype=bool)
 
 
 def _default_colour(table: PointTable) -> str:
-    """Return the column to colour by: of a result, how high in the layer; else the height."""
+    """Return the column that colours: stratigraphic for a result, else the third coordinate."""
     result = {"stratigraphic", *UNFOLDED} <= set(table.frame.columns)
     return "stratigraphic" if result else table.columns[2]

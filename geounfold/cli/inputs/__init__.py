@@ -1,1 +1,1 @@
-"""What commands read: points, block sizes, drill-holes, options."""
+"""What commands read: points, block sizes, drill-holes, grades, options."""

@@ -1,4 +1,4 @@
-"""The sides of blocks on the command line, and the volumes they give."""
+"""The sides of blocks, from --sizes or from columns, and the blocks' volumes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def columns_or_lengths(text: str) -> Triple | tuple[float, float, float]:
-    """Return an option's three lengths, or the columns it names."""
+    """Return the three lengths, or the three columns, that an option is given."""
     try:
         a, b, c = (float(word) for word in text.split(","))
     except ValueError:
@@ -27,12 +27,12 @@ def columns_or_lengths(text: str) -> Triple | tuple[float, float, float]:
 
 
 class BlockVolumes:
-    """The columns of a block model's volumes, folded and unfolded, and their sums.
+    """Volumes of blocks, folded and unfolded: output columns and sums.
 
     Parameters
     ----------
     sizes : str or None
-        Three columns or lengths as the user gave them; without, columns are found by name.
+        The user's three columns or lengths; None finds columns by name.
     names : sequence of str
         The table's columns.
     source : str
@@ -41,7 +41,7 @@ class BlockVolumes:
     Raises
     ------
     InputError
-        Columns that are not there.
+        A column that the table does not have.
     OptionError
         Lengths that are not positive.
     """
@@ -53,7 +53,7 @@ class BlockVolumes:
         self._folded = self._unfolded = 0.0
         self._without = 0
         if sizes is None:
-            with suppress(InputError):  # several sets of columns: none is taken unasked
+            with suppress(InputError):  # several sets of columns: the user names none
                 found = size_columns(names)
                 self._sides = None if found is None else Sides(found)
             return
@@ -66,7 +66,10 @@ class BlockVolumes:
         self._sides = Sides(given)
 
     def columns(self, frame: pd.DataFrame, results: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return block_volume and unfolded_volume of a batch of rows; nothing without sides."""
+        """Return block_volume and unfolded_volume of a batch of rows; empty without sides.
+
+        Their sums are added to those of earlier batches.
+        """
         if self._sides is None:
             return {}
         volume = self._sides.of(frame).prod(axis=1)
@@ -89,7 +92,7 @@ class BlockVolumes:
         }
 
     def warnings(self) -> list[str]:
-        """Say how many rows had no sides."""
+        """Return the warning of rows without sides."""
         if not self._without:
             return []
         return [f"{self._without} blocks have no positive sides, and so no volume"]

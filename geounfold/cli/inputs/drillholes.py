@@ -1,4 +1,4 @@
-"""Drill-holes on the command line: their options, and their outputs in both spaces."""
+"""Drill-holes on the command line: options, tables, outputs in both spaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.paths import ending
 from geounfold.io.polylines import write_polylines
 from geounfold.io.tables.files import check_writable, with_columns, write_table
 
@@ -23,27 +23,26 @@ if TYPE_CHECKING:
     from geounfold.drillholes import DrillHoles
     from geounfold.geometry.mesh import Floats
 
-TRACE_ENDINGS = (*TABLE_ENDINGS, ".vtp")
 _XYZ = ("x", "y", "z")
 
 _NEEDS_HOLES = ("composite", "dip_positive_down", "holes_columns", "traces_out")
 
 Carry = Callable[["Floats"], dict[str, Any]]
-"""From points (n, 3) to the result's columns."""
+"""From folded points, (n, 3), to output columns."""
 
 
 @dataclass(frozen=True, eq=False)
 class HoleData:
-    """What a command carries of drill-holes.
+    """Drill-holes that a command carries.
 
     Attributes
     ----------
     holes : DrillHoles
         As read.
     length : float or None
-        Of composites, where samples are these.
+        Length of composites; None for the intervals as assayed.
     samples, traces : DataFrame or None
-        Where an output or the report asks for them.
+        None if neither an output nor the report has them.
     """
 
     holes: DrillHoles
@@ -52,7 +51,7 @@ class HoleData:
     traces: pd.DataFrame | None
 
     def facts(self, results: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
-        """Return what was read and carried, for the summary."""
+        """Return counts of what was read and carried, for the summary."""
         counts = {
             name: {
                 "points": len(columns["location"]),
@@ -64,7 +63,7 @@ class HoleData:
         return {**self.holes.facts(), "composite_length": self.length, **counts}
 
     def carried(self, carry: Carry) -> dict[str, dict[str, Any]]:
-        """Return the result's columns of samples and traces, by output."""
+        """Return the output columns of ``samples`` and ``traces``."""
         frames = {"samples": self.samples, "traces": self.traces}
         return {
             name: carry(frame[list(_XYZ)].to_numpy(dtype=np.float64))
@@ -73,7 +72,7 @@ class HoleData:
         }
 
     def write(self, parts: Mapping[str, Path], results: Mapping[str, dict[str, Any]]) -> None:
-        """Write the outputs that were asked for."""
+        """Write the outputs that are wanted."""
         if self.samples is not None and "--samples-out" in parts:
             frame = with_columns(self.samples, results["samples"])
             write_table(parts["--samples-out"], frame, columns=_XYZ)
@@ -82,12 +81,12 @@ class HoleData:
 
 
 def check_hole_options(args: Namespace) -> None:
-    """Raise where options of drill-holes do not go together.
+    """Raise OptionError if options of drill-holes contradict each other.
 
     Raises
     ------
     OptionError
-        One of them without --holes, or --holes without an output or beside --samples.
+        An option of drill-holes without --holes; --holes without an output, or with --samples.
     """
     if args.holes is None:
         for name in (*_NEEDS_HOLES, "strict"):
@@ -101,7 +100,7 @@ def check_hole_options(args: Namespace) -> None:
 
 
 def read_holes(args: Namespace, console: Console) -> HoleData | None:
-    """Return the drill-holes of a command, and say what was found in their tables."""
+    """Return the drill-holes of a command, and warn of rows that cannot be used."""
     if args.holes is None:
         return None
     length = _length(args.composite)
@@ -141,7 +140,7 @@ def _length(text: str | None) -> float | None:
 
 
 def _fields(text: str | None) -> dict[str, str]:
-    """Return the columns of a ``field=name,...`` option, in which quotes protect commas."""
+    """Return the columns by field of ``field=name,...``; a name with a comma has quotes."""
     fields: dict[str, str] = {}
     for item in next(csv.reader([text or ""], skipinitialspace=True), []):
         field, equals, name = item.partition("=")
@@ -155,7 +154,7 @@ def _fields(text: str | None) -> dict[str, str]:
 
 
 def _write_traces(path: Path, traces: pd.DataFrame, columns: dict[str, Any]) -> None:
-    """Write traces as a table, or as lines in the folded space with the other as an array."""
+    """Write traces as a table; as .vtp, lines in the folded space and an array ``unfolded``."""
     if ending(path) != ".vtp":
         write_table(path, with_columns(traces, columns))
         return

@@ -1,4 +1,4 @@
-"""Estimation on the command line: words to options, and what the summary tells."""
+"""Estimation on the command line: its options, its samples and its summary."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 
-from geounfold.cli.inputs.unfold_options import whole_number
+from geounfold.cli.inputs.numbers import number, three_numbers, whole_number
 from geounfold.errors import InputError, OptionError
 from geounfold.io.paths import existing_file
 
@@ -25,18 +24,18 @@ _WHOLE = ("min_samples", "max_samples", "max_per_hole")
 def estimation(
     args: Namespace, samples: PointTable, blocks: PointTable, stage: Callable[[str], None]
 ) -> Estimation:
-    """Return the estimates that a command asks for.
+    """Return the estimates on the blocks.
 
     Raises
     ------
     OptionError
-        Words that are no valid options.
+        An option with an invalid value.
     InputError
-        Files without what is needed.
+        A file without a column that is needed, or that cannot be read.
     """
     near = _neighbourhood(args)
-    mean = None if args.mean is None else _number(args.mean, "--mean")
-    power = _number(args.power, "--power")
+    mean = None if args.mean is None else number(args.mean, "--mean")
+    power = number(args.power, "--power")
     workers = whole_number(args.workers, "--workers")
     variogram = None if args.variogram is None else _variogram(args.variogram)
     from geounfold.estimation import estimate
@@ -52,7 +51,7 @@ def estimation(
 
 
 def summarised(args: Namespace, result: Estimation, stage: Callable[[str], None]) -> dict[str, Any]:
-    """Return the summary, with the cross-validation where it is asked for."""
+    """Return the summary; with --cross-validate, the cross-validation too."""
     out = result.summary()
     if args.cross_validate:
         from geounfold.estimation import score
@@ -81,7 +80,7 @@ def _table(samples: PointTable, args: Namespace) -> pd.DataFrame:
 
 
 def _hole(samples: PointTable) -> str | None:
-    """Return the column that names the holes, where there is one."""
+    """Return the column of the holes' names, if there is exactly one."""
     from geounfold.drillholes import ALIASES
     from geounfold.io.coordinate_columns import plain_name
 
@@ -91,18 +90,20 @@ def _hole(samples: PointTable) -> str | None:
 
 
 def _neighbourhood(args: Namespace) -> dict[str, Any]:
-    """Return what was said of the search."""
+    """Return the options of the search that are given."""
     near: dict[str, Any] = {
         name: whole_number(getattr(args, name), f"--{name.replace('_', '-')}")
         for name in _WHOLE
         if getattr(args, name) is not None
     }
     if args.radii is not None:
-        near["radii"] = _three(args.radii, "--radii")
+        near["radii"] = three_numbers(args.radii, "--radii", "150,150,20")
     if args.rotation is not None:
         if args.radii is None:
-            raise OptionError("--rotation needs --radii: without, the search is the variogram's")
-        near["rotation"] = _three(args.rotation, "--rotation")
+            raise OptionError(
+                "--rotation needs --radii: without them the search follows the variogram"
+            )
+        near["rotation"] = three_numbers(args.rotation, "--rotation", "30,0,0")
     return near
 
 
@@ -114,21 +115,3 @@ def _variogram(path: str) -> Variogram:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text") from error
     return from_json(text, path)
-
-
-def _three(text: str, option: str) -> tuple[float, float, float]:
-    words = text.split(",")
-    if len(words) != 3:
-        raise OptionError(f"{option} needs three numbers such as 150,150,20, not '{text}'")
-    a, b, c = (_number(word, option) for word in words)
-    return a, b, c
-
-
-def _number(text: str, option: str) -> float:
-    try:
-        value = float(text)
-    except ValueError as error:
-        raise OptionError(f"{option} needs a number, not '{text}'") from error
-    if not np.isfinite(value):
-        raise OptionError(f"{option} needs a finite number, not '{text}'")
-    return value

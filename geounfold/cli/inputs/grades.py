@@ -1,4 +1,4 @@
-"""Exploratory data analysis on the command line: the grade that ``--grade`` names."""
+"""The grade that ``--grade`` names, for exploratory data analysis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def check_grade_options(args: Namespace) -> None:
-    """Raise where ``--grade`` has no samples, or nowhere to be shown.
+    """Raise OptionError if ``--grade`` has no samples or no report.
 
     Raises
     ------
@@ -38,16 +38,14 @@ def check_grade_options(args: Namespace) -> None:
 def graded_samples(
     args: Namespace, samples: PointTable | None, holes: HoleData | None
 ) -> pd.DataFrame | None:
-    """Return coordinates and grade of the samples to explore; None where no grade is asked for.
-
-    This is known before anything is computed, and so are the errors.
+    """Return coordinates and grade of the samples to explore; None without --grade.
 
     Raises
     ------
     OptionError
-        The grade is a coordinate, or a column of the holes that is no grade.
+        The column holds a coordinate, or another place along a hole.
     InputError
-        No such column, values that are no numbers, or too few of them for a variogram.
+        No such column, text in it, or too few numbers for a variogram.
     """
     if args.grade is None:
         return None
@@ -64,7 +62,7 @@ def graded_samples(
 
 
 def exploration(args: Namespace, result: Unfolding, graded: pd.DataFrame) -> Exploration:
-    """Return what the samples tell in both spaces.
+    """Return the exploration of a grade in both spaces.
 
     Raises
     ------
@@ -82,7 +80,7 @@ def exploration(args: Namespace, result: Unfolding, graded: pd.DataFrame) -> Exp
 def _table(
     grade: str, samples: PointTable | None, holes: HoleData | None
 ) -> tuple[Floats, Floats, str]:
-    """Return coordinates, grades and the file they are from."""
+    """Return coordinates, (n, 3), grades, (n,), and their file."""
     if samples is not None:
         if grade in (*samples.columns, *"xyz"):
             raise OptionError(f"--grade {grade} names a coordinate")

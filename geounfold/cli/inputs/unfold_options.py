@@ -1,13 +1,13 @@
-"""Words to options: those of unfolding, from the command line and a file of them."""
+"""The options of the unfolding, from the command line and a file."""
 
 from __future__ import annotations
 
 import shlex
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from geounfold.errors import InputError, OptionError
 from geounfold.io.paths import existing_file
@@ -15,28 +15,64 @@ from geounfold.io.paths import existing_file
 if TYPE_CHECKING:
     from geounfold.unfolding.options import UnfoldOptions
 
+T = TypeVar("T")
+
 MODEL_OPTIONS = (
     *("method", "flattener", "hull", "split", "up", "datum", "coordinates", "body"),
     *("neighbours", "reach"),
 )
+"""The options of `UnfoldOptions` that have a flag of the same name and a value."""
 
 
 def unfold_options(args: Namespace) -> UnfoldOptions:
-    """Return the options given by words and file, words first; the pipeline knows the others."""
+    """Return the options that are given; those of the command line override those of --config.
+
+    Raises
+    ------
+    OptionError
+        A value outside the valid ones. The message is that of `UnfoldOptions`, behind the flag.
+    InputError
+        The file of options cannot be read.
+    """
     from geounfold.unfolding.options import UnfoldOptions
 
-    readers: dict[str, Callable[[str], Any]] = {
-        "up": lambda text: tuple(_number(part) for part in text.split(",")),
-        "body": _number,
-        "neighbours": _number,
-        "reach": _number,
-    }
     given = {n: getattr(args, n) for n in MODEL_OPTIONS if hasattr(args, n)}
-    values: dict[str, Any] = {n: readers.get(n, str)(text) for n, text in given.items()}
+    values = {name: _READERS.get(name, str)(text) for name, text in given.items()}
     if hasattr(args, "allow_uncertified"):
         values["allow_uncertified"] = args.allow_uncertified
     path = config_file(args)
-    return UnfoldOptions(**values) if path is None else replace(_read_config(path), **values)
+    base = None if path is None else _read_config(path)
+
+    def made(chosen: Mapping[str, Any]) -> UnfoldOptions:
+        return UnfoldOptions(**chosen) if base is None else replace(base, **chosen)
+
+    return flagged(made, values)
+
+
+def flagged(make: Callable[[Mapping[str, Any]], T], values: Mapping[str, Any]) -> T:
+    """Return an options class made of values; an error begins with the flag at fault.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the options of some of the values.
+    values : mapping
+        By the option's name.
+
+    Raises
+    ------
+    OptionError
+        That of the class, behind the flag whose value is refused by itself.
+    """
+    try:
+        return make(values)
+    except OptionError:
+        for name, value in values.items():
+            try:
+                make({name: value})
+            except OptionError as error:
+                raise OptionError(f"--{name.replace('_', '-')}: {error}") from error
+        raise
 
 
 def _read_config(path: str) -> UnfoldOptions:
@@ -53,7 +89,7 @@ def _read_config(path: str) -> UnfoldOptions:
 
 
 def config_file(args: Namespace) -> str | None:
-    """Return the file of --config, where the command has it and it was given."""
+    """Return the file of --config; None for a command without it, or if it is not given."""
     path: str | None = getattr(args, "config", None)
     return path
 
@@ -69,18 +105,23 @@ def listed(names: str) -> str | list[str]:
     return "all" if found == ["all"] else found
 
 
-def whole_number(text: str, option: str) -> int:
-    """Return the whole number of 1 or more that an option is given."""
-    if not text.isdecimal() or int(text) < 1:
-        raise OptionError(f"{option} needs a whole number of 1 or more, not '{text}'")
-    return int(text)
-
-
 def _number(text: str) -> float | str:
-    """Return a whole number or a number, or the text for UnfoldOptions to refuse or take."""
+    """Return a whole number or a number; any other text, for the options class to refuse."""
     for kind in (int, float):
         try:
             return kind(text)
         except ValueError:
             continue
     return text
+
+
+def _numbers(text: str) -> tuple[float | str, ...]:
+    return tuple(_number(word) for word in text.split(","))
+
+
+_READERS: dict[str, Callable[[str], Any]] = {
+    "up": _numbers,
+    "body": _number,
+    "neighbours": _number,
+    "reach": _number,
+}

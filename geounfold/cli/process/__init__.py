@@ -1,1 +1,1 @@
-"""The process that a command runs in: signals, journal of outputs, supervision."""
+"""The process of a command: signals, the journal of its outputs, supervision."""

@@ -1,1 +1,1 @@
-"""What a user sees on the terminal: messages, progress, time left, completion."""
+"""What a user sees on the terminal: messages, progress, time left."""

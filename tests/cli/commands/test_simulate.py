@@ -21,7 +21,7 @@ def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "no_such_case", "-o", str(tmp_path / "x.csv")]) == 2
     assert "sim_case_1" in capsys.readouterr().err
     assert main(["simulate", "--list", "-o", str(tmp_path / "x.csv")]) == 2
-    assert "--list stands alone" in capsys.readouterr().err
+    assert "--list has neither CASE nor -o" in capsys.readouterr().err
 
 
 def test_simulate_writes_four_decimals_and_about_so_many_blocks(tmp_path: Path) -> None:

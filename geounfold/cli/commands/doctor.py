@@ -1,9 +1,10 @@
-"""What `geounfold doctor` finds: versions, extras, and whether what is installed works."""
+"""`geounfold doctor`: versions, extras, and whether the installed libraries work."""
 
 from __future__ import annotations
 
 import os
 import platform
+from argparse import Namespace
 from collections.abc import Callable
 from importlib import metadata
 from typing import Any
@@ -11,9 +12,24 @@ from typing import Any
 from packaging.requirements import Requirement
 
 from geounfold._version import __version__
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError, MissingDependencyError
 
 Progress = Callable[[str], None]
+
+
+def run(args: Namespace, console: Console) -> None:
+    """Print what is installed and whether it works.
+
+    Raises
+    ------
+    MissingDependencyError
+        A library that geounfold needs is missing or does not work.
+    """
+    found = check_up(console.stage)
+    console.done("checked")
+    console.answer(found, lambda: _in_words(found))
+    _check_health(found)
 
 
 def check_up(progress: Progress) -> dict[str, Any]:
@@ -27,9 +43,10 @@ def check_up(progress: Progress) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``geounfold``, ``python``, ``platform`` and ``processors``; ``libraries`` and, by extra,
-        ``extras``: of each library its ``version`` (None where it is missing), what is ``needed``
-        and whether that is ``ok``; ``checks``: by name ``ok`` and, where not, ``message``.
+        ``geounfold``, ``python``, ``platform`` and ``processors``. ``libraries``, and ``extras``
+        by extra, have the ``version`` of each library (None if it is missing), the version
+        ``needed``, and whether it is ``ok``. ``checks`` have, by name, ``ok`` and, if false, a
+        ``message``.
     """
     libraries, extras = _libraries()
     return {
@@ -43,16 +60,16 @@ def check_up(progress: Progress) -> dict[str, Any]:
     }
 
 
-def healthy(found: dict[str, Any]) -> None:
-    """Raise MissingDependencyError where something that geounfold needs is missing or broken."""
+def _check_health(found: dict[str, Any]) -> None:
+    """Raise MissingDependencyError if a library that geounfold needs is missing or broken."""
     ill = [name for name, library in found["libraries"].items() if not library["ok"]]
     ill += [name for name, check in found["checks"].items() if not check["ok"]]
     if ill:
         raise MissingDependencyError(f"not in order: {', '.join(ill)}")
 
 
-def in_words(found: dict[str, Any]) -> str:
-    """Return the findings as lines."""
+def _in_words(found: dict[str, Any]) -> str:
+    """Return what was found as lines of text."""
     head = f"geounfold {found['geounfold']}, Python {found['python']}, {found['platform']}, "
     lines = [f"{head}{found['processors']} processors", "", "libraries"]
     lines += _library_lines(found["libraries"], "missing")
@@ -77,13 +94,13 @@ def _library_lines(libraries: dict[str, dict[str, Any]], absent: str) -> list[st
 
 
 def _libraries() -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Return the libraries that geounfold declares, and those of each extra but ``dev``'s kind."""
+    """Return the libraries that geounfold needs, and those of each extra for users."""
     needed: dict[str, Any] = {}
     extras: dict[str, dict[str, Any]] = {}
     try:
         declared = metadata.requires("geounfold") or []
     except metadata.PackageNotFoundError:
-        declared = []  # run from its source without being installed
+        declared = []  # run from its source, not installed
     for requirement in map(Requirement, declared):
         marker = requirement.marker
         if marker is None or marker.evaluate({"extra": ""}):
@@ -95,7 +112,7 @@ def _libraries() -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     return needed, extras
 
 
-_EXTRAS = ("formats", "geostat", "completion", "tetgen")  # those for users
+_EXTRAS = ("formats", "geostat", "completion", "tetgen")  # for users, unlike dev
 
 
 def _library(requirement: Requirement) -> dict[str, Any]:
@@ -147,4 +164,4 @@ CHECKS: dict[str, Callable[[], None]] = {
     "MeshLab": _meshlab,
     "off-screen rendering": _drawing,
 }
-"""What is tried, by name; each raises where it does not work."""
+"""The checks by name; one raises if its library does not work."""

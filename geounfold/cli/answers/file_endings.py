@@ -1,4 +1,4 @@
-"""The endings of the files that commands write."""
+"""Endings of the files that commands write."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from geounfold.io.paths import TABLE_ENDINGS
 
 POINTS_OUT = (*TABLE_ENDINGS, *point_endings(writing=True))
 SURFACES_OUT = surface_endings(writing=True)
+TRACES = (*TABLE_ENDINGS, ".vtp")
 JSON = (".json",)
 MAP = (".npz",)
 VTU = (".vtu",)

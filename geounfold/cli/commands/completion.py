@@ -1,4 +1,4 @@
-"""Completion of the command line by shells."""
+"""`geounfold completion`: a script that lets a shell complete the command line."""
 
 from __future__ import annotations
 
@@ -7,21 +7,33 @@ from collections.abc import Iterator
 from typing import Any
 
 from geounfold.cli.arguments.parser import build_parser
+from geounfold.cli.terminal.console import Console
 from geounfold.errors import MissingDependencyError
 
 _FILES = frozenset(
     {
         *("points", "output", "summary", "map", "mesh", "report", "samples", "samples_out", "top"),
         *("bottom", "holes", "traces_out", "folded", "unfolded", "truth", "config"),
+        *("source", "target", "variogram", "differences"),
     }
 )
 
 
-def script(shell: str) -> str:
-    """Return the script that teaches a shell (one of ``parser.SHELLS``) to complete.
+def run(args: argparse.Namespace, console: Console) -> None:
+    """Print the script."""
+    console.say(script(args.shell))
 
-    It knows the commands, their options, the options' names for values, the simulated bodies, and
-    where files belong.
+
+def script(shell: str) -> str:
+    """Return the script for a shell.
+
+    It completes commands, all their options, the named values of options, the simulated bodies,
+    and files.
+
+    Parameters
+    ----------
+    shell : str
+        One of `geounfold.cli.arguments.tools.SHELLS`.
 
     Raises
     ------
@@ -32,11 +44,11 @@ def script(shell: str) -> str:
         import shtab
     except ImportError as error:
         raise MissingDependencyError(
-            "shells are taught by shtab, which is not installed: "
+            "shell completion needs shtab, which is not installed: "
             "pip install 'geounfold[completion]'"
         ) from error
     parser = build_parser()
-    named = _named()
+    named = _named_values()
     for action in _actions(parser):
         if action.dest in _FILES:
             action.complete = shtab.FILE
@@ -45,8 +57,8 @@ def script(shell: str) -> str:
     return str(shtab.complete(parser, shell=shell)) + "\n"
 
 
-def _named() -> dict[str, tuple[str, ...]]:
-    """Return the values that have names, by option."""
+def _named_values() -> dict[str, tuple[str, ...]]:
+    """Return the valid words of the options that have words as values."""
     from geounfold.synthetic import CASES
     from geounfold.unfolding.options import VALID
 
@@ -54,7 +66,7 @@ def _named() -> dict[str, tuple[str, ...]]:
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:
-    """Yield every option and argument of a parser and its commands."""
+    """Yield every option and argument of a parser and of its commands."""
     for action in parser._actions:
         yield action
         if isinstance(action, argparse._SubParsersAction):

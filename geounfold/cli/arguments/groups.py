@@ -1,0 +1,146 @@
+"""The options that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from geounfold.cli.arguments.help import HelpAll, Parser, Section
+
+
+def add_command(commands: Any, name: str, summary: str, **settings: Any) -> Parser:
+    """Add a command and return its parser; `settings` are those of `Parser`."""
+    description = f"{summary[0].upper()}{summary[1:]}."
+    parser: Parser = commands.add_parser(name, help=summary, description=description, **settings)
+    return parser
+
+
+def add_common(parser: Parser) -> None:
+    """Add the options that every command has."""
+    group = parser.section("all commands")
+    group.add("--overwrite", action="store_true", help="replace outputs that exist")
+    group.add("--json", action="store_true", help="print the answer as one JSON object")
+    group.add("--quiet", action="store_true", help="no progress and no warnings")
+    group.add("-v", "--verbose", action="count", default=0, help="log to stderr; twice: more")
+    group.add("-h", "--help", action="help", help="print this help")
+    group.add("--help-all", action=HelpAll, help="print rarer options, results and formats too")
+
+
+def add_columns(section: Section) -> None:
+    """Add the options for the columns of coordinates and for rows without them."""
+    section.add(
+        "--columns",
+        metavar="A,B,C",
+        help="columns of the coordinates, if not x/y/z, XC/YC/ZC, centroid_x/y/z, "
+        "easting/northing/elevation or alike",
+    )
+    section.add(
+        "--drop-invalid",
+        action="store_true",
+        rare=True,
+        help="leave out rows whose coordinates are missing or infinite; the summary counts them",
+    )
+
+
+def add_frame(section: Section, whose: str, rotation: str = "") -> None:
+    """Add the options of a block model in coordinates of its own."""
+    section.add(
+        "--origin",
+        metavar="X,Y,Z",
+        rare=True,
+        help=f"world coordinates of the model's origin, if {whose} are in the model's own",
+    )
+    section.add(
+        "--rotation",
+        metavar="BEARING,PLUNGE,DIP",
+        rare=True,
+        help=rotation or "with --origin: how the model is turned, in degrees (default 0,0,0)",
+    )
+
+
+def add_holes(section: Section) -> None:
+    """Add the options of drill-holes."""
+    section.add(
+        "--holes",
+        nargs=3,
+        metavar=("COLLAR", "SURVEY", "ASSAY"),
+        help="tables of drill-holes; minimum curvature between surveys",
+    )
+    section.add(
+        "--composite", metavar="LENGTH", help="length of composites along a hole, from its collar"
+    )
+    section.add(
+        "--traces-out", metavar="T", help="the holes' paths in both spaces: a table or .vtp"
+    )
+    section.add(
+        "--holes-columns",
+        metavar="FIELD=NAME,...",
+        rare=True,
+        help="columns that are not found by name; fields: hole, x, y, z, depth, at, azimuth, dip, "
+        "from, to",
+    )
+    section.add(
+        "--dip-positive-down",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        rare=True,
+        help="whether positive dips point down (default: by their sign, if all have the same)",
+    )
+    section.add(
+        "--strict",
+        action="store_true",
+        rare=True,
+        help="refuse tables with a row that would be left out, cut or changed",
+    )
+
+
+def add_method(section: Section) -> None:
+    """Add the options that become `UnfoldOptions`.
+
+    They have no defaults here: `UnfoldOptions` knows and checks them.
+    """
+    section.add(
+        "--config",
+        metavar="C.toml",
+        default=argparse.SUPPRESS,
+        help="file of options, see `geounfold init`; those given here override it",
+    )
+    for name, metavar, rare, help_text in _METHOD:
+        section.add(
+            f"--{name}", metavar=metavar, rare=rare, default=argparse.SUPPRESS, help=help_text
+        )
+
+
+_METHOD = (
+    (
+        *("method", "M", False),
+        "how the map is made: sheet (default), thesis, ufo, stratigraphic, shear, volumetric or "
+        "isomap",
+    ),
+    ("datum", "D", False, "flat surface: mid (default), top, bottom or proportional: both"),
+    ("up", "X,Y,Z", False, "direction of the top (hanging wall) (default 0,0,1)"),
+    ("body", "N", False, "which of several separate bodies, 0 the largest, or all"),
+    ("flattener", "F", True, "spring (default) or another; `geounfold compare` tries all"),
+    (
+        *("hull", "H", True),
+        "surface around the body: auto (default), alpha, ball_pivoting, poisson or density",
+    ),
+    (
+        *("split", "S", True),
+        "how the hull is split into top and bottom: signed (default; right on overturned folds "
+        "too) or normal",
+    ),
+    (
+        *("coordinates", "K", True),
+        "coordinates in the control mesh: tet (default; proved one-to-one), wachspress or mvc (of "
+        "its prisms; smooth, not proved)",
+    ),
+    ("neighbours", "K", True, "neighbours of a block in NMD and epsilon (default 26)"),
+    (
+        "reach",
+        "B",
+        True,
+        "distance around the body to which points are carried, in blocks (default 3)",
+    ),
+)
+"""Name, value, whether rare, and help."""

@@ -1,0 +1,57 @@
+"""Texts that the full help of several commands shares; lines of 79 characters at most."""
+
+from __future__ import annotations
+
+TABLES = ".csv, .csv.gz or .parquet"
+
+POINTS = ".csv, .parquet or another format"
+
+POINT_FORMATS = """\
+formats of points:
+  .csv .csv.gz .parquet
+  GSLIB .gslib .geoeas .dat .gs (text becomes codes)
+  VTK .vtu; .vtp and .vti read only; of solid cells the centres are read
+  GOCAD .vs (text becomes codes); .ts read only
+  OMF .omf and .geoh5; of block models the centroids, dx, dy, dz and i, j, k"""
+
+FORMATS = f"""\
+{POINT_FORMATS}
+formats of surfaces:
+  .ply .obj .off .stl (single precision) .vtp .omf .geoh5 .dxf (faces),
+  GOCAD .ts, or a table with columns x, y, z, v1, v2, v3
+geoh5, DXF, and OMF to be written, need: pip install 'geounfold[formats]'"""
+
+RESULTS = """\
+results:
+  unfolded_x, unfolded_y, unfolded_z
+                   coordinates without the folds, in the input's unit; z is up
+                   towards the top side, in true thickness
+  stratigraphic    0 at the bottom surface, 1 at the top
+  location         inside the control mesh, extrapolated around it, or outside
+                   the map's reach: no result
+  mesh_distance    distance from the control mesh, 0 inside it"""
+
+KEPT_ROWS = """\
+OUT has every column and row of POINTS, in order. A result replaces a column of
+the same name in its place."""
+
+ANGLES = """\
+turned block models:
+  bearing is the compass direction of the model's own y axis (0: not turned),
+  plunge its inclination below the horizontal, and dip the angle by which the x
+  axis turns downwards about it, in degrees. With --origin, OUT has world_x,
+  world_y and world_z too; commands read these before other coordinates."""
+
+HOLES = """\
+drill-holes:
+  --samples-out has hole, from, to; x, y, z of the midpoint of each interval or
+  composite; position (surveyed, or extrapolated straight on below the last
+  survey); coverage of composites; the grades; and the results. --traces-out
+  has hole, depth, x, y, z, position and the results along every hole. As .vtp
+  it holds lines in the folded space and the point array unfolded. Messages and
+  the summary name the rows that cannot be used."""
+
+
+def joined(*texts: str) -> str:
+    """Return texts with an empty line between each two."""
+    return "\n\n".join(texts)

@@ -1,0 +1,121 @@
+"""`geounfold transfer`: values moved between folded and unfolded blocks."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
+from geounfold.cli.inputs.block_sizes import columns_or_lengths
+from geounfold.cli.inputs.model_frame import model_axes, model_frame
+from geounfold.cli.inputs.numbers import whole_number
+from geounfold.cli.inputs.points import read_table
+from geounfold.cli.terminal.console import Console
+from geounfold.errors import InputError, OptionError
+from geounfold.io import Outputs, PointTable, write_json
+from geounfold.io.coordinate_columns import Triple
+from geounfold.io.paths import existing_file
+from geounfold.io.result_columns import UNFOLDED, world_columns
+
+if TYPE_CHECKING:
+    from geounfold.body.block_model import BlockModel
+    from geounfold.estimation.transfer import Transfer
+    from geounfold.geometry.mesh import Floats
+
+_SPACES = ("folded", "unfolded")
+
+
+def run(args: Namespace, console: Console) -> None:
+    """Move values between blocks of the two spaces, weighted by volume."""
+    if args.to not in _SPACES:
+        raise OptionError(f"--to must be folded or unfolded, not '{args.to}'")
+    split = whole_number(args.split, "--split")
+    outputs = Outputs.planned(
+        {"--output": (args.output, POINTS_OUT), "--summary": (args.summary, JSON)},
+        [args.map, args.source, args.target],
+        overwrite=args.overwrite,
+        watcher=console.journal,
+    )
+    existing_file(Path(args.map))
+    back = args.to == "folded"
+    frame = None if args.origin is None else model_frame(args)
+    place = None if frame is None else frame.to_world
+    read = partial(read_table, console=console, drop_invalid=args.drop_invalid)
+    flat: dict[str, tuple[Triple, ...]] = {"prefer": (UNFOLDED,)}
+    folded = {"place": place}
+    source = read(args.source, args.source_columns, **(flat if back else folded))
+    target = read(args.target, args.target_columns, **(folded if back else flat))
+    names = _value_columns(args.values, source)
+    target.check_writable(args.output)
+    values = np.column_stack([source.numbers(name) for name in names])
+    axes = model_axes(args.rotation) if frame is None else frame.axes
+    from geounfold.estimation.transfer import transfer
+    from geounfold.mapping import mesh_map
+
+    saved = mesh_map.load(args.map)
+    level = np.eye(3)
+    from_blocks = _blocks(source, args.source_sizes, level if back else axes)
+    to_blocks = _blocks(target, args.target_sizes, axes if back else level)
+    console.stage("moving values")
+    carry = saved.to_flat if back else saved.to_folded
+    result = transfer(from_blocks, values, to_blocks, carry, split=split)
+    columns: dict[str, Any] = {}
+    for k, name in enumerate(names):
+        columns |= {name: result.means[:, k], f"{name}_share": result.share[:, k]}
+    if back and frame is not None:
+        columns |= world_columns(target.points)
+    facts = _facts(names, result)
+    with outputs.writing() as parts:
+        target.write(parts["--output"], columns)
+        if "--summary" in parts:
+            write_json(parts["--summary"], facts)
+    for name in names:
+        lost = facts["values"][name]["unassigned"]
+        if lost:
+            console.warn(
+                f"{args.target}: {lost} of {len(target)} blocks got no value of {name}: no block "
+                f"of {args.source} with a value lies at their image"
+            )
+    console.done(f"{len(names)} values moved onto {len(target)} blocks in {args.output}")
+    console.answer(facts)
+
+
+def _facts(names: list[str], result: Transfer) -> dict[str, Any]:
+    """Return, by value, the blocks without it and the sums of volume times value."""
+    lost = np.count_nonzero(~result.assigned, axis=0)
+    partly = np.count_nonzero(result.assigned & (result.share < 1), axis=0)
+    return {
+        "blocks": len(result.volumes),
+        "values": {
+            name: {
+                "unassigned": int(lost[k]),
+                "partly_assigned": int(partly[k]),
+                "source_total": float(result.total[k]),
+                "target_total": float(result.carried[k]),
+            }
+            for k, name in enumerate(names)
+        },
+    }
+
+
+def _value_columns(text: str, source: PointTable) -> list[str]:
+    """Return the columns that --values names."""
+    names = [name.strip() for name in text.split(",")]
+    if not all(names) or len(set(names)) < len(names):
+        raise OptionError(f"--values needs different column names such as AU,CU, not '{text}'")
+    missing = [name for name in names if name not in source.frame.columns]
+    if missing:
+        raise InputError(f"{source.source}: no column '{missing[0]}' for --values")
+    return names
+
+
+def _blocks(table: PointTable, sizes: str | None, axes: Floats | None) -> BlockModel:
+    """Return a table's blocks; `sizes` are three columns or three lengths."""
+    from geounfold.io.block_sizes import block_model
+
+    given = None if sizes is None else columns_or_lengths(sizes)
+    return block_model(table.frame, table.points, given, axes, source=table.source)

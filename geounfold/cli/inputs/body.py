@@ -1,0 +1,83 @@
+"""All that `geounfold unfold` reads."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from geounfold.cli.inputs.block_sizes import BlockVolumes
+from geounfold.cli.inputs.drillholes import HoleData, read_holes
+from geounfold.cli.inputs.grades import graded_samples
+from geounfold.cli.inputs.model_frame import model_frame
+from geounfold.cli.inputs.points import open_table, read_samples
+from geounfold.cli.terminal.console import Console
+from geounfold.io import PointTable, read_surface
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from geounfold.body.model_frame import ModelFrame
+    from geounfold.geometry.mesh import TriMesh
+    from geounfold.io.tables.large import PointStream
+
+
+@dataclass(frozen=True, eq=False)
+class BodyInputs:
+    """A body to unfold, and what is carried with it.
+
+    Attributes
+    ----------
+    table : PointTable or PointStream
+        The blocks; a PointTable if there is a report.
+    frame : ModelFrame or None
+        That of the blocks; None if they are in the world.
+    volumes : BlockVolumes
+        From the sides of the blocks.
+    samples : PointTable or None
+        Loose samples.
+    holes : HoleData or None
+        Drill-holes.
+    graded : DataFrame or None
+        Coordinates and grade of the samples that the report explores.
+    top, bottom : TriMesh or None
+        Given surfaces.
+    """
+
+    table: PointTable | PointStream
+    frame: ModelFrame | None
+    volumes: BlockVolumes
+    samples: PointTable | None
+    holes: HoleData | None
+    graded: pd.DataFrame | None
+    top: TriMesh | None
+    bottom: TriMesh | None
+
+
+def read_body(args: Namespace, console: Console) -> BodyInputs:
+    """Return what the options of `geounfold unfold` name.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used.
+    OptionError
+        An option that does not fit its file.
+    """
+    frame = model_frame(args)
+    table = open_table(args, console, frame=frame, whole=args.report is not None)
+    table.check_writable(args.output)
+    names = table.frame.columns if isinstance(table, PointTable) else table.rows.names
+    volumes = BlockVolumes(args.sizes, [str(name) for name in names], args.points)
+    samples = read_samples(args, console)
+    holes = read_holes(args, console)
+    return BodyInputs(
+        table,
+        frame,
+        volumes,
+        samples,
+        holes,
+        graded_samples(args, samples, holes),
+        None if args.top is None else read_surface(args.top),
+        None if args.bottom is None else read_surface(args.bottom),
+    )

@@ -9,12 +9,12 @@ from typing import Any
 
 import pandas as pd
 
+from geounfold.comparison.known_body import KnownBody
 from geounfold.comparison.methods import Blocks, compare_methods
 from geounfold.comparison.names import flattener_names
 from geounfold.errors import GeounfoldError, OptionError
 from geounfold.flattening import Flattening, flatten, measures
 from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
-from geounfold.synthetic import Body
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.run import Progress, unfold
 
@@ -146,7 +146,7 @@ def _surfaces(
         given = {"surface": given}
     if not isinstance(given, Mapping):
         chosen = replace(unfolding or UnfoldOptions(), allow_uncertified=True)
-        points = given.folded if isinstance(given, Body) else given
+        points = given.folded if isinstance(given, KnownBody) else given
         pairs = unfold(points, chosen, progress=progress).surfaces
         return {name: pairs[name].folded for name in _ORDER if name in pairs}
     if unfolding is not None:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold.backends.igl import boundary_loops
+from geounfold.comparison.known_body import KnownBody
 from geounfold.comparison.names import flattener_names, method_names
 from geounfold.errors import GeounfoldError, InputError, OptionError
 from geounfold.flattening import measures
@@ -20,12 +21,11 @@ from geounfold.mapping.carried import checked_points
 from geounfold.methods import METHODS, SurfacePair
 from geounfold.quality.neighbour_distances import NEIGHBOURS, epsilon
 from geounfold.quality.truth import aligned_rms
-from geounfold.synthetic import Body
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.run import Progress, unfold
 
-Blocks = Floats | pd.DataFrame | Body
+Blocks = Floats | pd.DataFrame | KnownBody
 
 METHOD_COLUMNS = (
     *("body", "method", "flattener", "blocks"),
@@ -112,14 +112,14 @@ def _named(bodies: Blocks | Mapping[str, Blocks]) -> Mapping[str, Blocks]:
     """Return bodies by name."""
     if isinstance(bodies, Mapping):
         return bodies
-    return {bodies.name if isinstance(bodies, Body) else "body": bodies}
+    return {bodies.name if isinstance(bodies, KnownBody) else "body": bodies}
 
 
 def _truths(
     named: Mapping[str, Blocks], truth: Floats | Mapping[str, Floats] | None
 ) -> dict[str, Floats]:
     """Return the truths by body, each checked to have its body's length."""
-    out = {name: body.truth for name, body in named.items() if isinstance(body, Body)}
+    out = {name: body.truth for name, body in named.items() if isinstance(body, KnownBody)}
     if truth is not None and not isinstance(truth, Mapping):
         if len(named) != 1:
             raise OptionError("several bodies need a mapping of their names to their truths")
@@ -128,7 +128,7 @@ def _truths(
         if name not in named:
             raise OptionError(f"there is a truth for {name}, but no such body")
         body = named[name]
-        count = len(body.folded) if isinstance(body, Body) else len(body)
+        count = len(body.folded) if isinstance(body, KnownBody) else len(body)
         out[name] = checked_points(W)
         if len(W) != count:
             raise OptionError(f"{name} has {count} blocks, but its truth has {len(W)} rows")
@@ -143,8 +143,8 @@ def _row(
     progress: Progress | None,
 ) -> dict[str, Any]:
     """Return one row of the table."""
-    simulated = given if isinstance(given, Body) else None
-    points = given.folded if isinstance(given, Body) else given
+    simulated = given if isinstance(given, KnownBody) else None
+    points = given.folded if isinstance(given, KnownBody) else given
     row: dict[str, Any] = {
         "body": label,
         "method": options.method,
@@ -168,7 +168,7 @@ def _since(clocks: tuple[float, float]) -> dict[str, float]:
     return {"seconds": wall, "cpu_seconds": cpu}
 
 
-def _block_figures(u: Unfolding, truth: Floats | None, body: Body | None) -> dict[str, Any]:
+def _block_figures(u: Unfolding, truth: Floats | None, body: KnownBody | None) -> dict[str, Any]:
     """Return the figures of the blocks that have an image."""
     there = np.asarray(u.carried.placed, dtype=bool)
     X, Y = u.folded[there], u.points[there]

@@ -194,7 +194,7 @@ def test_the_command_compares_methods(fold, tmp_path, monkeypatch, capsys):
     assert printed[1].split()[:2] == ["body", "shear"]
     assert f"{table.rms[0]:.4g}" in printed[1]
     assert main(["compare", "x.csv", "--truth", "x.csv", "-o", "u.csv"]) == 2
-    assert "give --methods too" in capsys.readouterr().err
+    assert "--truth needs --methods" in capsys.readouterr().err
     fold.frame(4)[:9].to_csv("short.csv", index=False)
     assert main([*argv, "--overwrite", "--truth", "short.csv"]) == 2
     assert "short.csv: has 9 rows" in capsys.readouterr().err

@@ -13,7 +13,7 @@ import numpy as np
 from geounfold.backends.igl import TetIndex, barycentric_in_tets
 from geounfold.backends.threads import over_slices, slices
 from geounfold.body.working_frame import Frame
-from geounfold.errors import OptionError
+from geounfold.errors import check_one_of
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers, TetMesh
 from geounfold.mapping.carried import Carried, Returned, checked_points
 from geounfold.mapping.control_mesh import ControlMesh
@@ -73,9 +73,7 @@ class UnfoldingMap:
         known: Sequence[TetIndex] = (),
         coordinates: str = "tet",
     ) -> None:
-        if coordinates not in COORDINATES:
-            valid = ", ".join(COORDINATES)
-            raise OptionError(f"unknown coordinates {coordinates!r}; valid: {valid}")
+        check_one_of("coordinates", coordinates, COORDINATES)
         self.coordinates = coordinates
         self.frame = frame
         self.control = control

@@ -241,7 +241,7 @@ def test_the_same_sentence_from_python_a_file_and_the_command_line(
         word = ",".join(map(str, value)) if isinstance(value, list) else str(value)
         out = str(tmp_path / "out.csv")
         assert main(["unfold", str(points), "-o", out, f"--{name}={word}"]) == 2
-        assert capsys.readouterr().err.strip() == f"geounfold: error: {sentence}"
+        assert capsys.readouterr().err.strip() == f"geounfold: error: --{sentence}"
 
 
 def test_the_template_fits_on_two_screens() -> None:

@@ -30,7 +30,8 @@ def unfold_options(args: Namespace) -> UnfoldOptions:
     Raises
     ------
     OptionError
-        A value outside the valid ones. The message is that of `UnfoldOptions`, behind the flag.
+        A value outside the valid ones. The message is that of
+        `UnfoldOptions`, with the flag in place of the name.
     InputError
         The file of options cannot be read.
     """
@@ -71,7 +72,10 @@ def flagged(make: Callable[[Mapping[str, Any]], T], values: Mapping[str, Any]) -
             try:
                 make({name: value})
             except OptionError as error:
-                raise OptionError(f"--{name.replace('_', '-')}: {error}") from error
+                flag, sentence = f"--{name.replace('_', '-')}", str(error)
+                own = sentence.startswith(f"{name} ")  # the flag takes the place of the name
+                said = sentence.removeprefix(name) if own else f": {sentence}"
+                raise OptionError(f"{flag}{said}") from error
         raise
 
 

@@ -35,9 +35,9 @@ class PreparedBody:
     Attributes
     ----------
     points : (n, 3) float
-        What the body is fitted to: its blocks moved onto their lattice, gaps filled.
+        Blocks moved onto their lattice, with gaps filled: what the method fits.
     blocks : (b, 3) float
-        Its blocks as they were given.
+        Blocks as the user gave them.
     frame : Frame
         Working frame.
     hull : Hull or None
@@ -45,23 +45,23 @@ class PreparedBody:
     split : SurfaceSplit
         The hull's (or the reference surfaces') faces as top, bottom and rim.
     up : (3,) float
-        World direction that the top is to look to, as a unit vector.
+        World direction towards which the top faces, unit vector.
     datum : str
         Surface that becomes flat; sides as in ``split``.
     flattener : str
-        A name in FLATTENERS.
+        Name of the flattener, a key of FLATTENERS.
     flattener_options : dataclass or None
         The flattener's options; None for its defaults.
     reach : float
-        How far past the body points are to be carried, in blocks.
+        Distance past the body, in blocks, up to which points are carried.
     options : Any
         The method's own options.
     sheet_options : SheetOptions
-        How reference surfaces are fitted.
+        Options of the mid surface, for every method that takes its surfaces from ``sheet``.
     stage : callable
         Times and names a stage: ``with stage("hull"):``.
     coarse : MergedBlocks or None
-        The points merged into cells, if they are many; hull and split then are in its unit.
+        The points merged into cells, if there are many; hull and split are then in cells.
     """
 
     points: Floats
@@ -80,7 +80,7 @@ class PreparedBody:
     coarse: MergedBlocks | None = None
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
-        """Lay a surface flat by the chosen flattener, as the answer comes."""
+        """Return a surface flattened by the chosen flattener; nothing is repaired."""
         how = self.flattener_options
         return flatten(mesh, self.flattener, start=start, options=how, repair=False)
 
@@ -96,7 +96,7 @@ class Placed:
     stratigraphic : (n,) float
         0 at the bottom surface, 1 at the top; NaN if there is no image.
     anchored : (n,) bool
-        Whether the surfaces hold the point; else they were continued past their border.
+        True if the surfaces reach over the point; False if they were continued past their border.
     """
 
     points: Floats
@@ -109,7 +109,7 @@ class Pointwise(Protocol):
 
     @property
     def way_back(self) -> bool:
-        """Whether there is a rule for the way back."""
+        """Whether the rule has an inverse."""
 
     def to_flat(self, points: Floats) -> Placed:
         """Place folded points (n, 3) in the flat space."""
@@ -122,7 +122,7 @@ class Pointwise(Protocol):
 class SurfacePair:
     """A reference surface in both spaces, and how it was flattened.
 
-    ``flattening`` is None for a surface that the method's map carried, not flattened itself.
+    ``flattening`` is None for a surface that was not flattened itself but carried by the map.
     """
 
     folded: TriMesh
@@ -132,7 +132,7 @@ class SurfacePair:
     def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
         """Return the surface in one space for pyvista.
 
-        The point data of the other space's name, (n, 3), holds each vertex's place there.
+        Each vertex's place in the other space is point data, (n, 3), under that space's name.
         """
         here, there, other = in_space(space, self.folded, self.unfolded)
         surface = here.to_pyvista()
@@ -142,10 +142,10 @@ class SurfacePair:
 
 @dataclass(frozen=True, eq=False)
 class BodyFit:
-    """Everything made of one body, working units.
+    """The fit of one body, working units.
 
-    One of ``control`` and ``rule`` is there: a control mesh, which can be certified, or a rule
-    for single points, of which nothing is proved.
+    Either ``control`` or ``rule`` is set: a control mesh, which can be certified, or a rule for
+    single points, about which nothing is proved.
 
     Attributes
     ----------
@@ -156,19 +156,19 @@ class BodyFit:
     control : ControlMesh or None
         Tetrahedra in both spaces; unfolded z up is the top side.
     shell : ControlMesh or None
-        Tetrahedra around them, for points outside; over the control mesh's vertices and others.
+        Tetrahedra around the control mesh, for points outside; its vertices come first.
     surfaces : dict of SurfacePair
         ``top``, ``bottom`` and, for all methods but the thesis's, ``mid``.
     flattenings : dict of Flattening
         Every surface that was flattened.
     sheet : SheetResult or None
-        The sheet method's stages, if the method has them.
+        Stages of the sheet method, if the method uses them.
     notes : dict
         Figures of the method for the summary.
     rule : Pointwise or None
-        The map of a method without a control mesh.
+        Map of a method without a control mesh.
     points : (n, 3) float or None
-        The body's blocks, which such a map is good for.
+        The body's blocks if ``rule`` is set: points near them count as inside.
     warnings : tuple of str
         One sentence each.
     """
@@ -193,18 +193,18 @@ class Method:
     Attributes
     ----------
     name : str
-        Its name in METHODS.
+        Key in METHODS.
     fit : callable
         ``fit(body) -> BodyFit``.
     options : str
-        The field of the unfolding's options that holds its own.
+        Name of the field of UnfoldOptions that holds the method's options.
     control : bool
-        Whether its map is a control mesh: can be certified, saved and drawn.
+        Whether its map is a control mesh, which can be certified, saved and drawn.
     reach : float or None
-        Distance from the control mesh, in blocks, up to which points are carried, for methods
-        with a mesh that leaves blocks outside and has no shell; None takes the user's.
+        Distance from the control mesh, in blocks, up to which points are carried; None for the
+        user's.  Set for methods without a shell whose mesh leaves blocks outside.
     hull : str
-        The hull that ``auto`` takes.
+        Hull that ``auto`` selects.
     surfaces : bool
         Whether it accepts reference surfaces in place of a hull.
     flattens : bool
@@ -247,7 +247,7 @@ def by_rule(
     Parameters
     ----------
     body, sheet, rule, notes, warnings
-        As BodyFit has them.
+        Fields of BodyFit.
     folded : mapping of TriMesh
         Surfaces by name, working units, which the rule lays flat.
     """
@@ -267,7 +267,7 @@ def by_rule(
 
 
 def carried_pair(folded: TriMesh, rule: Pointwise) -> SurfacePair:
-    """Return a surface as a pointwise map carries it, without faces that have no image."""
+    """Return a surface carried by a pointwise map, without the faces that have no image."""
     flat = rule.to_flat(folded.V).points
     there: Bools = np.asarray(np.isfinite(flat).all(axis=1))
     whole: Bools = np.asarray(there[folded.F].all(axis=1))

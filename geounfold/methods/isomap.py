@@ -1,4 +1,4 @@
-"""Landmark Isomap of the mid surface, then each block by its distances, as Unfolding.jl does."""
+"""Landmark Isomap of the mid surface, then each block by its distances (as in Unfolding.jl)."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from geounfold.methods.sheet.meshing.build import register
 from geounfold.methods.sheet.result import SheetResult
 from geounfold.methods.sheet.stages import sheet_stages
 
-_TIE = 1e-6  # of a distance: neighbours this equally far are all taken or all left
-_SPARE = 24  # neighbours asked for beyond those wanted, for ties
+_TIE = 1e-6  # relative difference of distances up to which neighbours are all taken or all left
+_SPARE = 24  # neighbours searched beyond those wanted, for ties
 _CHUNK = 4096  # points placed at once
-_STEPS = 60  # of Levenberg and Marquardt, most
-_STILL = 1e-10  # blocks: a point that moves less has arrived
-_TINY = 1e-12  # blocks: points this near have no direction to each other
-_OWN = 1e-9  # blocks: a point this near to a block is the block
+_STEPS = 60  # most steps of Levenberg and Marquardt
+_STILL = 1e-10  # blocks: a point that moves less is finished
+_TINY = 1e-12  # blocks: below this distance two points define no direction
+_OWN = 1e-9  # blocks: a point nearer than this to a block counts as the block
 _HASH = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
 
-# Unfolding.jl's own numbers:
-_NEAR = 50  # placed points that a block keeps its distances to
-_ROUNDS = 4  # rounds in which blocks are placed, each by the blocks of those before it
-_LARGEST = 2.5  # blocks: one whose distance to a neighbour is further off is placed again
+# Values of Unfolding.jl:
+_NEAR = 50  # placed points whose distances to a block are kept
+_ROUNDS = 4  # rounds in which blocks are placed, each from the blocks of earlier rounds
+_LARGEST = 2.5  # blocks: with a larger error of a distance to a neighbour a block is placed again
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class IsomapMethodOptions:
     neighbours : int
         Neighbours of each point of the mid surface in the graph.
     landmarks : int
-        Points of the mid surface from which distances are measured; all if there are no more.
+        Points of the mid surface from which distances are measured; all points if there are fewer.
 
     Raises
     ------
@@ -63,26 +63,26 @@ class IsomapMethodOptions:
 def fit_isomap(body: PreparedBody) -> BodyFit:
     """Return the map of a body by landmark Isomap (Caixeta and Costa 2021).
 
-    Points of the mid surface are joined with their nearest neighbours; the shortest paths along
-    the graph replace lengths along the surface, and classical scaling of the paths between the
-    landmarks (de Silva and Tenenbaum 2004) lays the surface flat.  A block starts over the
-    nearest point of the surface, at its distance from it.  It then moves to the place at
-    which its distances to the nearest placed points are, in the least squares, the folded body's.
+    Points of the mid surface are joined with their nearest neighbours; the shortest paths along the
+    graph replace lengths along the surface, and classical scaling of the paths between the
+    landmarks (de Silva and Tenenbaum 2004) lays the surface flat.  A block starts over the nearest
+    point of the surface, at its distance from it.  It then moves to the place at which its
+    distances to the nearest placed points fit those of the folded body by least squares.
 
-    What differs from Unfolding.jl: the mid surface is the one that ``sheet`` fits, not thinned
-    sections; landmarks are the farthest from each other, not drawn; the least squares are solved
-    by Levenberg and Marquardt, not Nelder and Mead; rounds are drawn by place, so that neither
-    the rows' order nor chance matter.
+    Differences from Unfolding.jl: the mid surface is the one that ``sheet`` fits, not thinned
+    sections; landmarks are the farthest from each other, not random; the least squares are solved
+    by Levenberg and Marquardt, not Nelder and Mead; a block's round depends on its place, so that
+    neither the order of the rows nor chance changes the result.
 
     Notes
     -----
     A path along a graph is longer than the line it follows, so the surface comes out too large;
-    layers do not slip; the map is known at the blocks alone, and has no inverse.
+    layers do not slip; the map is known only at the blocks, and has no inverse.
 
     Raises
     ------
     FlatteningError
-        The graph falls apart, or has no two dimensions.
+        The graph of neighbours is not connected, or its distances do not span a plane.
     """
     options: IsomapMethodOptions = body.options
     sheet = sheet_stages(body, "mid", 0.0)
@@ -103,7 +103,7 @@ def landmark_isomap(P: Floats, options: IsomapMethodOptions) -> tuple[Floats, in
     Raises
     ------
     FlatteningError
-        The graph of neighbours falls apart, or its distances have no two dimensions.
+        The graph of neighbours is not connected, or its distances do not span a plane.
     """
     graph = _graph(P, options.neighbours)
     parts = int(connected_components(graph, directed=False)[0])
@@ -174,14 +174,14 @@ def _placed(P: Floats, mid: TriMesh, uv: Floats) -> Floats:
 
 
 def _rounds(P: Floats) -> Ints:
-    """Return the round that places each point, (n,): drawn by its place alone."""
+    """Return the round in which each point is placed, (n,): a function of the place only."""
     cell = np.floor(P * 8 + 0.318).astype(np.int64)
     mixed = np.bitwise_xor.reduce(cell * _HASH, axis=1)
     return np.asarray((mixed ^ (mixed >> 13)) % _ROUNDS, dtype=np.int64)
 
 
 def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
-    """Return blocks over the nearest point of the surface, as high as they are far from it."""
+    """Return blocks over the nearest point of the surface, at their distance from it."""
     distance, near = cKDTree(mid.V).query(P)
     near = np.asarray(near, dtype=np.int64)
     above = np.einsum("ij,ij->i", P - mid.V[near], vertex_normals(mid.V, mid.F)[near])
@@ -191,7 +191,7 @@ def _first_guess(P: Floats, mid: TriMesh, known: Floats) -> Floats:
 
 
 def _sound(P: Floats, flat: Floats) -> Bools:
-    """Return the points with distances to their neighbours that are off by at most 2.5 blocks."""
+    """Return which points keep their distances to their neighbours to within 2.5 blocks."""
     near = np.asarray(cKDTree(P).query(P, k=_NEAR)[1], dtype=np.int64)
     out = np.ones(len(P), dtype=bool)
     for start in range(0, len(P), _CHUNK):
@@ -204,12 +204,12 @@ def _sound(P: Floats, flat: Floats) -> Bools:
 
 
 class _Known:
-    """Placed points, by distances to which others are placed.
+    """Placed points, from which others are placed by their distances.
 
     Parameters
     ----------
     P, flat : (n, 3) float
-        The points in both spaces; the nearest 50 of a point count, ties included.
+        The points in both spaces; the 50 nearest to a point are used, ties included.
     """
 
     def __init__(self, P: Floats, flat: Floats) -> None:
@@ -223,7 +223,7 @@ class _Known:
         return np.asarray(distance), self._flat[near]
 
     def place(self, Q: Floats, guess: Floats) -> Floats:
-        """Return points (k, 3) moved from a guess to the places that fit their distances best."""
+        """Return points (k, 3) moved from a guess to the places that best fit their distances."""
         out = np.empty_like(guess)
         for start in range(0, len(Q), _CHUNK):
             rows = slice(start, start + _CHUNK)
@@ -270,14 +270,14 @@ def _misfit(x: Floats, at: Floats, distance: Floats, weight: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class NeighbourRule:
-    """A map known at placed points: others follow by their distances to the nearest of them.
+    """A map known at placed points; others are placed by their distances to the nearest of them.
 
     Attributes
     ----------
     known, placed : (n, 3) float
         The points in both spaces.
     sheet : SheetResult
-        Its top and bottom give the stratigraphic coordinate.
+        Source of top and bottom, for the stratigraphic coordinate.
     """
 
     known: Floats
@@ -291,19 +291,19 @@ class NeighbourRule:
         return _Known(self.known, self.placed)
 
     def to_flat(self, points: Floats) -> Placed:
-        """Place folded points: at their own place if they are known, else by distances."""
+        """Place folded points: known ones at their stored place, others by distances."""
         away, guess = self._tree.nearest(points)
         out, rest = guess.copy(), away > _OWN
         out[rest] = self._tree.place(points[rest], guess[rest])
         return Placed(out, self._share(out), np.ones(len(out), dtype=bool))
 
     def _share(self, flat: Floats) -> Floats:
-        """Return how far up between bottom and top flat points lie, by the nearest vertex."""
+        """Return the stratigraphic coordinate of flat points, from the nearest vertex."""
         layers, surfaces = self.sheet.mesh.layers, self.sheet.mesh.surfaces
         near = np.asarray(cKDTree(self.placed[: len(layers.P), :2]).query(flat[:, :2])[1])
         low, high = (surfaces[name][1].V[near, 2] for name in ("bottom", "top"))
         return np.asarray((flat[:, 2] - low) / (high - low))
 
     def to_folded(self, points: Floats) -> Floats:
-        """Raise: there is no rule for the way back."""
+        """Raise InputError: the map has no inverse."""
         raise InputError("method isomap has no way back: use --method sheet")

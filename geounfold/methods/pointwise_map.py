@@ -1,4 +1,4 @@
-"""A map by a rule for single points, carried and counted like one by a control mesh."""
+"""A map given by a rule for single points, with the interface of a control mesh's map."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from geounfold.methods.contract import Pointwise
 
 
 class PointwiseMap:
-    """A fitted unfolding without a control mesh: carries points, and proves nothing.
+    """A fitted unfolding without a control mesh: it carries points, but nothing about it is proved.
 
     Parameters
     ----------
     name : str
-        The method's.
+        Name of the method.
     frame : Frame
         Working frame.
     rule : Pointwise
         The map, in working units.
     blocks : (b, 3) float
-        The body, working units: a point is inside if a block holds it, to half a block's
-        diagonal, and has no image farther off than the reach.
+        Blocks of the body, working units.  A point within half a block's diagonal of one is inside;
+        a point farther away than the reach has no image.
     reach : float
-        How far past the body points are carried, in blocks.
+        Distance past the body, in blocks, up to which points are carried.
     """
 
     coordinates = "tet"
@@ -50,7 +50,7 @@ class PointwiseMap:
 
     @property
     def fault(self) -> str:
-        """Why the map is not proved one-to-one."""
+        """The reason why the map is not proved one-to-one."""
         return f"method {self.name} has no control mesh: nothing is proved"
 
     @cached_property
@@ -63,15 +63,15 @@ class PointwiseMap:
         return cKDTree(points[np.isfinite(points).all(axis=1)])
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
-        """Carry points to the flat space, or with ``inverse`` from it back.
+        """Carry points to the flat space, or back with ``inverse``.
 
         Parameters
         ----------
         points : (n, 3) float
-            Folded points in the data's coordinates; with ``inverse`` unfolded points, whose
-            empty rows (all NaN: no image) stay empty.
+            Folded points in the data's coordinates; with ``inverse`` unfolded points.  Empty rows
+            (all NaN: no image) stay empty.
         inverse : bool
-            Direction.
+            True for the way from the flat space back to the folded one.
 
         Returns
         -------
@@ -82,7 +82,7 @@ class PointwiseMap:
         Raises
         ------
         InputError
-            Points of another shape, or not finite; a method that has no way back.
+            Points of another shape, or not finite; or the method has no inverse.
         """
         if inverse and not self.rule.way_back:
             raise InputError(f"method {self.name} has no way back: use --method sheet")
@@ -111,7 +111,7 @@ class PointwiseMap:
         )
 
     def returned(self, points: Floats, carried: Carried) -> Returned | None:
-        """Return how points (n, 3) come back from their images, None without a way back."""
+        """Return points (n, 3) carried back from their images; None if the map has no inverse."""
         if not self.rule.way_back:
             return None
         back = self.carry(carried.points, inverse=True)
@@ -133,7 +133,7 @@ class PointwiseMap:
 
 
 def no_mesh(method: str, what: str) -> str:
-    """Return the error message on something that needs a control mesh."""
+    """Return the error message for something that needs a control mesh."""
     return f"method {method} has no control mesh, so {what}: use --method sheet"
 
 

@@ -1,4 +1,4 @@
-"""Vertical simple shear: every vertical line slides as one until the reference is level."""
+"""Vertical simple shear: vertical lines slide past each other until the reference is level."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from geounfold.methods.vertical_heights import vertical_rule, vertical_warnings
 
 
 def fit_shear(body: PreparedBody) -> BodyFit:
-    """Return the map that keeps x and y and takes from z the height of a reference surface.
+    """Return the map that keeps x and y and subtracts the reference surface's height from z.
 
-    The reference lies midway, along the vertical, between top and bottom; ``datum`` moves it to
-    the top or the bottom, or makes both level.  Volumes stay, and lengths along dipping layers
-    shrink by the cosine of the dip.  x and y are the frame's: those of the data but for a rigid
-    motion.
+    The reference lies midway, along the vertical, between top and bottom; ``datum`` moves it to the
+    top or the bottom, or makes both level.  Volumes are kept; lengths along dipping layers shrink
+    by the cosine of the dip.  x and y are those of the working frame, a rigid motion of the data's.
 
     Raises
     ------
     SplitError
-        The sheet stands on end; see also ``sheet``.
+        The sheet is vertical, or has no mid surface (as for ``sheet``).
     """
     return vertical_fit(body, body.datum)
 

@@ -1,4 +1,4 @@
-"""The stratigraphic coordinate of geostatistics: how far up between bottom and top."""
+"""The stratigraphic coordinate of geostatistics: the relative height between bottom and top."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ def fit_stratigraphic(body: PreparedBody) -> BodyFit:
     Raises
     ------
     SplitError
-        The sheet stands on end; see also ``sheet``.
+        The sheet is vertical, or has no mid surface (as for ``sheet``).
     """
     return vertical_fit(body, "proportional")

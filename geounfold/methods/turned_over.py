@@ -21,21 +21,21 @@ class TurnedOver:
 
     @property
     def way_back(self) -> bool:
-        """As the rule's."""
+        """Whether the rule has an inverse."""
         return self.rule.way_back
 
     def to_flat(self, points: Floats) -> Placed:
-        """Place folded points as the rule does, then turn them over."""
+        """Place folded points by the rule, then turn them over."""
         placed = self.rule.to_flat(points)
         return Placed(half_turn(placed.points), 1 - placed.stratigraphic, placed.anchored)
 
     def to_folded(self, points: Floats) -> Floats:
-        """Turn flat points back over, then carry them as the rule does."""
+        """Turn flat points back over, then carry them by the rule."""
         return self.rule.to_folded(half_turn(points))
 
 
 def half_turn(V: Floats) -> Floats:
-    """Return flat points (n, 3) turned about the x axis by half a turn: never mirrored."""
+    """Return flat points (n, 3) rotated by half a turn about the x axis, so not mirrored."""
     out: Floats = V * np.array([1.0, -1.0, -1.0])
     return out
 
@@ -49,7 +49,7 @@ def _over_control(control: ControlMesh) -> ControlMesh:
 
 
 def turned_over(fit: BodyFit) -> BodyFit:
-    """Return the fit with top and bottom exchanged: the flat space turned about its x axis."""
+    """Return the fit with top and bottom exchanged: the flat space rotated about its x axis."""
     notes = dict(fit.notes)
     if "layers_follow" in notes:
         notes["layers_follow"] = OTHER_SIDE.get(str(notes["layers_follow"]), "mid")

@@ -1,4 +1,4 @@
-"""One reference surface laid flat, blocks anchored to it along its normals, as U-Fo does."""
+"""One reference surface laid flat, with blocks anchored to it along its normals (as in U-Fo)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class AnchoredSheet:
     Attributes
     ----------
     sheet : SheetResult
-        The stages that gave the surface.
+        Stages from which the surface was taken.
     mid : TriMesh
-        The surface; it looks to the top.
+        The surface, with normals towards the top.
     uv : (n, 2) float
         The surface laid flat.
     low, high : (n,) float
@@ -42,14 +42,14 @@ class AnchoredSheet:
     folded: TetMesh
 
     def control(self, datum: Datum) -> ControlMesh:
-        """Return the map that stands every prism square on its flat triangle."""
+        """Return the map to prisms perpendicular to the flat triangles."""
         z = np.stack([datum.z(h, self.low, self.high) for h in self.height])
         share = (self.height - self.low) / (self.high - self.low)
         flat = np.column_stack([np.tile(self.uv, (len(z), 1)), z.ravel()])
         return ControlMesh(self.folded, self.folded.with_vertices(flat), share.ravel())
 
     def surfaces(self, datum: Datum) -> dict[str, SurfacePair]:
-        """Return mid, top and bottom in both spaces, as that map carries them."""
+        """Return mid, top and bottom in both spaces, carried by that map."""
         heights = {"mid": np.zeros_like(self.low), "top": self.high, "bottom": self.low}
         mesh, out = self.sheet.mesh, {}
         for name, height in heights.items():
@@ -71,15 +71,14 @@ def fit_ufo(body: PreparedBody) -> BodyFit:
 
     Notes
     -----
-    U-Fo itself takes the surface as an input and anchors each block by a ray of its own; the
-    thesis says no more of it (sections 2.3.2 and 3.2.6).  Layers do not slip over one another
-    here: off the reference surface, lengths along a fold's layers change by height times
-    curvature.
+    U-Fo itself takes the surface as an input and anchors each block by its own ray; the thesis
+    gives no more detail (sections 2.3.2 and 3.2.6).  Layers do not slip over one another here: off
+    the reference surface, lengths along a fold's layers change by height times curvature.
 
     Raises
     ------
     SplitError, FlatteningError
-        As the stages do.
+        The mid surface could not be fitted or flattened.
     """
     anchored = anchor(body)
     mesh = anchored.sheet.mesh

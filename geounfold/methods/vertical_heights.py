@@ -1,4 +1,4 @@
-"""Surfaces as heights over a plane, and the vertical coordinates that they give."""
+"""Surfaces as heights over a plane, and maps by vertical coordinates."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from geounfold.methods.contract import Placed, PreparedBody, mean_top_normal
 from geounfold.methods.sheet.result import SheetResult
 
 _STEEPEST = 3.0  # rise over run beyond which a border is continued level (72 degrees)
-_STANDING = 0.05  # |cosine| of the top's mean normal and up below which a sheet stands on end
-_SAME = 1e-6  # blocks: two heights this near are one
-_CLEAR = 1.0  # blocks: rays start so far off
+_STANDING = 0.05  # |cosine| of the top's mean normal and up below which a sheet is vertical
+_SAME = 1e-6  # blocks: two heights closer than this are one
+_CLEAR = 1.0  # blocks: distance from the surface at which rays start
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +28,8 @@ class VerticalOptions:
     Parameters
     ----------
     axis : str
-        Vertical is ``up``, the direction given as up, or ``across``, the lattice's (of scattered
-        points the principal) axis across the body.
+        Vertical direction: ``up``, the direction given as up, or ``across``, the lattice axis
+        across the body (the principal axis for scattered points).
 
     Raises
     ------
@@ -52,14 +52,14 @@ class Heights(NamedTuple):
 
 
 class HeightField:
-    """A surface as a height over a plane: the outermost if there are several.
+    """A surface as a height over a plane: the outermost height if a vertical meets it repeatedly.
 
     Parameters
     ----------
     mesh : TriMesh
         The surface; vertical is z.
     side : int
-        +1 if the highest of several heights counts, -1 if the lowest does.
+        +1 to take the highest of several heights, -1 the lowest.
     """
 
     def __init__(self, mesh: TriMesh, side: int) -> None:
@@ -73,8 +73,8 @@ class HeightField:
     def at(self, xy: Floats) -> Heights:
         """Return the heights at places (n, 2).
 
-        Past the surface's border it is continued by the plane of the nearest triangle, level
-        if that is steep.
+        Past its border the surface is continued by the plane of the nearest triangle, or
+        horizontally if that is steep.
         """
         outer, inner = (self._first(xy, side) for side in (self._side, -self._side))
         met = np.isfinite(outer)
@@ -116,7 +116,7 @@ class VerticalColumn(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class VerticalRule:
-    """A map that keeps x and y and makes z of the heights of top and bottom.
+    """A map that keeps x and y and computes z from the heights of top and bottom.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ class VerticalRule:
     bottom, top : HeightField
         The surfaces, turned.
     datum : Datum
-        What z is made of the height over the middle.
+        How z follows from the height over the middle.
     """
 
     turn: Floats
@@ -141,7 +141,7 @@ class VerticalRule:
         return VerticalColumn(low.z, high.z, low.met & high.met, low.several | high.several)
 
     def to_flat(self, points: Floats) -> Placed:
-        """Place folded points; none if the top does not lie over the bottom."""
+        """Place folded points; no image if the top does not lie over the bottom."""
         P = points @ self.turn.T
         at = self.column(P[:, :2])
         half = (at.top - at.bottom) / 2
@@ -164,7 +164,7 @@ class VerticalRule:
 
 
 def _height(datum: Datum, z: Floats, half: Floats) -> Floats:
-    """Return the heights over the middle that a datum makes z of."""
+    """Return the heights over the middle from which the datum computes z."""
     if datum.name == "top":
         return z + half - datum.top
     if datum.name == "bottom":
@@ -177,21 +177,22 @@ def _height(datum: Datum, z: Floats, half: Floats) -> Floats:
 def vertical_rule(
     body: PreparedBody, sheet: SheetResult, datum: str
 ) -> tuple[VerticalRule, VerticalColumn]:
-    """Return the map of a body by its top and bottom, and the columns that its blocks stand in.
+    """Return the map of a body by its top and bottom, and the vertical columns of its blocks.
 
     Parameters
     ----------
-    body : Body
+    body : PreparedBody
         ``options`` are VerticalOptions.
     sheet : SheetResult
-        Whose top and bottom are taken.
+        Source of top and bottom.
     datum : str
-        See Datum; the mean half thickness over the blocks stands for both sides.
+        Surface that becomes flat (see Datum); the mean half thickness over the blocks is used on
+        both sides.
 
     Raises
     ------
     SplitError
-        The sheet stands on end, or its top lies over its bottom nowhere.
+        The sheet is vertical, or its top lies over its bottom nowhere.
     """
     turn = _upright(body)
     fields = []

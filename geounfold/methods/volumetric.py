@@ -1,4 +1,4 @@
-"""Tetrahedra laid flat as a whole, with as little strain as they can have."""
+"""Tetrahedra laid flat all at once, with the least strain."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class VolumetricOptions:
     Parameters
     ----------
     max_iter : int
-        Most steps; one takes about 60 microseconds per tetrahedron.
+        Largest number of steps; one takes about 60 microseconds per tetrahedron.
     tol : float
-        Stop if a step moves no vertex by more than this, in blocks.
+        Displacement, in blocks: iteration stops if a step moves no vertex farther.
     weight : float
-        Weight of top's and bottom's mean square distance (blocks) from their planes.
+        Weight of the mean square distance (blocks) of top and bottom from their planes.
 
     Raises
     ------
@@ -47,18 +47,19 @@ class VolumetricOptions:
 def fit_volumetric(body: PreparedBody) -> BodyFit:
     """Return the map of least volumetric strain between flat top and bottom.
 
-    The prisms over the mid surface (those of ``ufo``, and from its map) deform so that
-    the symmetric Dirichlet energy, summed over their tetrahedra by folded volume, is least:
-    libigl's SLIM (Rabinovich et al. 2017), which inverts none.  The mesh's top and bottom are
-    drawn softly to the planes at their mean heights; along these planes they are free.
+    The prisms over the mid surface start from ``ufo`` and its map.  They deform so that the
+    symmetric Dirichlet energy, summed over their tetrahedra by folded volume, is least: libigl's
+    SLIM (Rabinovich et al. 2017), which inverts no tetrahedron.  A penalty draws the mesh's top and
+    bottom to the planes at their mean heights; along these planes they are free.
 
-    The energy counts every strain alike, so it spends as little shear as it can: it bends a
-    layer back like a beam, whereas flexural slip shears it.
+    The energy weighs every strain alike, so shear is kept small: a layer is bent back like a beam,
+    whereas flexural slip shears it.
 
     Raises
     ------
     SplitError, FlatteningError
-        As the stages do; and if the start has inverted tetrahedra or libigl fails.
+        The mid surface could not be fitted or flattened, the start has inverted tetrahedra, or
+        libigl fails.
     """
     chosen: VolumetricOptions = body.options
     anchored = anchor(body)

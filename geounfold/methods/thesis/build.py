@@ -39,7 +39,7 @@ class ThesisMesh:
     top, bottom : TriMesh
         The two folded surfaces; both look up.
     top_flat, bottom_flat : Flattening
-        The same laid flat; ``uv`` are turned and shifted into the control mesh's place.
+        The same laid flat; ``uv`` are rotated and shifted into the control mesh's coordinates.
     thickness : float
         Distance of the two flat sheets: the difference of the surfaces' mean heights.
     bottom_missed, top_missed : int
@@ -49,9 +49,11 @@ class ThesisMesh:
     squeezed : int
         Vertices where top and bottom were moved apart to the least gap.
     hidden, pieces : float
-        Larger of the two sides' shares that lay behind itself, and that was torn off.
+        Share of a side that lay behind itself, and share that was torn off; the larger of both
+        sides.
     steep : float
-        Share of the hull away from its rim that the filter missed or took for the other side.
+        Share of the hull, away from its rim, that the orientation filter missed or put on the wrong
+        side.
     """
 
     control: ControlMesh
@@ -79,18 +81,18 @@ def thesis_control(
 ) -> ThesisMesh:
     """Return the control mesh of the thesis (sections 3.2.2 to 3.2.4), and every part of it.
 
-    The body is turned to its principal axes.  Hull faces whose normal looks up or down make
-    the top and the bottom; each is flattened on its own by springs and laid flat at its mean
-    height.  The vertices of each, projected vertically, are inserted into the other (Algorithm
-    1), so that both get one plane triangulation; heights and flat positions are interpolated
-    linearly.  Aligned triangles make prisms, prisms three tetrahedra.
+    The body is rotated to its principal axes.  Hull faces with normals up or down form the top and
+    the bottom; each is flattened on its own by springs and laid flat at its mean height.  The
+    vertices of each, projected vertically, are inserted into the other (Algorithm 1), so that both
+    get one plane triangulation; heights and flat positions are interpolated linearly.  Aligned
+    triangles make prisms, prisms three tetrahedra.
 
     Parameters
     ----------
     points : (n, 3) float
         Blocks, working units.
     hull : TriMesh
-        Closed, outward hull; the thesis's is an alpha shape through the outermost blocks.
+        Closed hull, faces outward; in the thesis an alpha shape through the outermost blocks.
     up : (3,) float, optional
         Direction towards the top; default the frame's third axis.  It chooses between the two
         directions of the principal axis across the body, along which the surfaces are paired.
@@ -100,8 +102,7 @@ def thesis_control(
         How far the hull runs inside the blocks' outer faces (``Hull.inset``).  Only the
         stratigraphic coordinate uses it, so that 0 and 1 are the body's own faces.
     flatten : callable
-        Lays a side flat from a start: ``flatten(mesh, start)``; by default by springs, as the
-        thesis.
+        ``flatten(mesh, start)`` lays a side flat from a start; default springs, as in the thesis.
 
     Returns
     -------
@@ -114,7 +115,7 @@ def thesis_control(
     InputError
         Points of a wrong shape or not finite.
     OptionError
-        ``up`` is no direction; see also ``flatten``.
+        ``up`` is no direction, or ``flatten`` refused its options.
     SplitError
         The body overhangs, is too steep for the filter, or has a top not over its bottom.
     NoSheetError
@@ -126,16 +127,16 @@ def thesis_control(
     -----
     Defects of the thesis's method that are kept on purpose:
 
-    * *Vertical pairing.*  A prism's edges are vertical, not normal to the layers, so layers
-      that slipped over each other are sheared on slopes.
+    * *Vertical pairing.*  A prism's edges are vertical, not normal to the layers.  So on slopes,
+      layers that slipped over each other come out sheared.
     * *Flat at mean heights.*  The two sheets' distance is the difference of the surfaces' mean
-      heights, for parallel layers under a vertical outline their thickness over the cosine of
-      the dip, averaged: folded layers come out too thick.  A thickness that varies is lost: a
-      lens comes out as a slab, stretched where it was thin.
+      heights.  For parallel layers under a vertical outline, that is the average of their thickness
+      over the cosine of the dip, so folded layers come out too thick.  A thickness that varies is
+      lost: a lens comes out as a slab, stretched where it was thin.
     * *Orientation filter.*  Slopes steeper than 72 degrees (normal's z below 0.3) belong to
       neither surface; in the gap both are continued by planes.  A rim that leans by more than 17
       degrees counts as top or bottom.
-    * *No overhang.*  A surface that covers itself is no height field: an error.
+    * *No overhang.*  A surface that overhangs itself is no height field and is refused.
     * *Independent flattening* of top and bottom, by edge springs alone.
 
     Defects not kept:
@@ -145,14 +146,15 @@ def thesis_control(
     * Bottom vertices outside the top's triangulation snapped to its nearest vertex.  Both
       surfaces are continued past their borders instead: from the nearest point of the border,
       along the plane fitted to the 24 nearest vertices, in height and in flat position alike.
-    * 18 to 23 % of the blocks lay outside the mesh.  A ring of border vertices around the
-      blocks and a pad above and below, which continues each prism linearly, hold them all.
+    * 18 to 23 % of the blocks lay outside the mesh.  Now it holds all of them: it has a ring of
+      border vertices around the blocks, and a pad above and below that continues each prism
+      linearly.
     * Neighbouring prisms cut along different diagonals (T1, T2, T3 in an arbitrary order of
       the vertices).  They are cut by vertex index, so that neighbours share them.
-    * Two flat sheets in no defined place to each other.  The bottom's is moved rigidly onto
-      the top's by least squares over the vertical pairs (mean slip zero).
-    * A hull with alpha by luck, a turn by theta sin(theta) and springs that stop at once or
-      never: cured in the hull, in the frame (here: axes as computed) and in the flattener.
+    * The two flat sheets had no defined relative position.  The bottom's is moved rigidly onto the
+      top's by least squares over the vertical pairs (mean slip zero).
+    * Alpha of the hull was found by trial; the body was rotated by theta sin(theta), where the
+      computed axes are used here; the springs stopped at once or never.
     """
     chosen = options or ThesisOptions()
     P = _checked_points(points)
@@ -219,12 +221,12 @@ def _checked_up(up: Floats | None) -> Floats | None:
 
 
 def _flat(mesh: TriMesh, flatten: Flatten) -> Flattening:
-    """Return one side laid flat, from its plan as Wang's springs do."""
+    """Return one side laid flat, starting from its plan as in Wang's springs."""
     return flatten(mesh, mesh.V[:, :2] - mesh.V[:, :2].mean(axis=0))
 
 
 def _moved(flat: Flattening, source: Floats, target: Floats) -> Flattening:
-    """Return a flattening moved by the rigid motion that takes source best onto target (k, 2)."""
+    """Return a flattening moved by the rigid motion that best fits source to target (k, 2)."""
     a, b = source.mean(axis=0), target.mean(axis=0)
     p, q = source - a, target - b
     angle = np.angle(np.vdot(p[:, 0] + 1j * p[:, 1], q[:, 0] + 1j * q[:, 1]))

@@ -16,7 +16,7 @@ from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 ON_FACE = 1e-6  # distance in plan below which a point lies in the footprint, working units
 NEIGHBOURS = 24  # vertices that give the slope past the border
 CELL = 1.5  # working units: spacing of the border's vertices
-MERGE = 0.5  # working units: in plan, nearest that two surfaces' vertices may be
+MERGE = 0.5  # working units: least distance in plan between vertices of the two surfaces
 
 
 class PlanField:
@@ -97,10 +97,10 @@ def joint_plan(blocks: Floats, top: PlanField, bottom: PlanField) -> JointPlan:
     """Return the Delaunay triangulation of both surfaces' vertices, and a border around it.
 
     Inserting the vertices of each surface into the other by Delaunay insertion, as Algorithm 1
-    does, ends at the Delaunay triangulation of both, whatever the order.  A vertex within
-    MERGE of one that is there already is not inserted.  The border are the nodes of a grid
-    of cells under the blocks and one ring more, except under both surfaces; triangles are kept
-    if they hold a block or their centre lies in such a cell.
+    does, ends at the Delaunay triangulation of both, whatever the order.  A vertex within MERGE of
+    an existing one is not inserted.  The border consists of the nodes of a grid of cells under the
+    blocks and one ring more, except under both surfaces.  Triangles are kept if they hold a block
+    or if their centre lies in such a cell.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from geounfold.methods.thesis import thesis_control
 
 
 def fit_thesis(body: PreparedBody) -> BodyFit:
-    """Fit by the thesis's method; both its sheets are flat, whatever the datum."""
+    """Return the fit by the thesis's method; both its sheets are flat for every datum."""
     hull = body.hull
     if hull is None:
         raise OptionError(

@@ -1,4 +1,4 @@
-"""Top and bottom of the thesis's method: the orientation filter, made into two height fields."""
+"""Top and bottom of the thesis's method: two height fields from the orientation filter."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ LIFT = 1e-6  # start of a ray above its face, working units
 HIDDEN = 0.05  # largest share of a side that may lie behind itself
 TORN = 0.1  # largest share of a side that steep slopes may tear off
 STEEP = 0.1
-"""Largest share of the hull away from its rim that the filter may miss or take for the other side:
-at most 0.08 on the bodies that the method could hold, 0.18 on the next."""
+"""Largest share of the hull, away from its rim, that the filter may miss or put on the wrong side.
+
+Measured: at most 0.08 on bodies that the method could unfold, 0.18 on the next.
+"""
 LIMITATION = "the thesis's method pairs top and bottom vertically and cannot hold an overhang"
 CURE = "use --method sheet"
 
@@ -31,14 +33,14 @@ class Side:
     Attributes
     ----------
     mesh : TriMesh
-        Its largest piece, vertical coordinate third; its faces look up on either side, and no
-        vertical line meets it twice.
+        Its largest piece, vertical coordinate third.  Its faces point up, for the bottom too, and
+        no vertical line meets it twice.
     height : float
         Mean height by area (on an even mesh that of the vertices), before the border was trimmed.
     hidden : float
         Share of the side's plan area that lay behind another part of the same side.
     pieces : float
-        Share of the plan area left that lay in smaller pieces and is dropped.
+        Share of the remaining plan area that lay in smaller pieces, which are dropped.
     """
 
     mesh: TriMesh
@@ -57,8 +59,8 @@ def upright_frame(points: Floats, up: Floats | None, axis: str) -> Floats:
     up : (3,) float or None
         Direction towards the top; None for the working frame's third axis.
     axis : str
-        ``principal``: the principal axes (section 3.2.1), the one of least extent third,
-        looking along ``up``.  ``up``: ``up`` itself third, and the principal axes across it.
+        ``principal``: the principal axes (section 3.2.1), the one of least extent third and
+        pointing along ``up``.  ``up``: ``up`` itself third, and the principal axes across it.
     """
     direction = np.array([0.0, 0.0, 1.0]) if up is None else up / np.linalg.norm(up)
     q = points - points.mean(axis=0)
@@ -76,8 +78,8 @@ def upright_frame(points: Floats, up: Floats | None, axis: str) -> Floats:
 def two_sides(hull: TriMesh, trim: int) -> tuple[Side, Side, float]:
     """Return top and bottom of a closed, outward hull with a vertical third coordinate.
 
-    The third answer is the share of the hull away from its rim that the filter missed or took
-    for the other side.
+    The third value is the share of the hull, away from its rim, that the filter missed or put on
+    the wrong side.
 
     Raises
     ------
@@ -159,7 +161,7 @@ def _without_border(mesh: TriMesh, name: str) -> TriMesh:
 
 
 def _hidden(mesh: TriMesh, outward: float) -> Bools:
-    """Return which faces have another one vertically in front of their centroid, (m,)."""
+    """Return which faces have another face vertically in front of their centroid, (m,)."""
     ray = np.broadcast_to([0.0, 0.0, outward], (len(mesh.F), 3))
     hit, _ = SurfaceIndex(mesh.V, mesh.F).first_hit(mesh.V[mesh.F].mean(axis=1) + LIFT * ray, ray)
     return hit >= 0

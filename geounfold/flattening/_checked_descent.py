@@ -15,7 +15,6 @@ from geounfold.geometry.mesh import Floats
 #: Symmetric Dirichlet energy of an isometry.
 ISOMETRY = 4.0
 
-
 #: A descent ends if a step lowers the energy by no more than this share of its excess over an
 #: isometry's.
 ENERGY_TOL = 1e-4

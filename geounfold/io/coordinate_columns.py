@@ -16,7 +16,6 @@ from geounfold.io.messages import counted, listing, shown
 
 Triple = tuple[str, str, str]
 
-
 # As plain_name returns them: "X_Centre (m)" is xcentre.
 _PATTERNS = (
     "centroid{}",
@@ -35,29 +34,23 @@ _PATTERNS = (
     "world{}",
 )
 
-
 _WORLD = (("xworld", "yworld", "zworld"), ("worldx", "worldy", "worldz"))
 
-
 _NAMED = (("easting", "northing", "elevation"), ("east", "north", "elevation"))
-
 
 _FAMILIES: tuple[Triple, ...] = (
     *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
     *_NAMED,
 )
 
-
 _SIDE_PATTERNS = (
     "{}inc", "{}increment", "d{}", "{}size", "size{}", "{}blocksize", "blocksize{}", "{}length",
     "length{}", "{}len", "dim{}", "{}dim", "{}dimension", "{}width", "block{}", "{}block",
 )  # fmt: skip
 
-
 _SIDES: tuple[Triple, ...] = tuple(
     (p.format("x"), p.format("y"), p.format("z")) for p in _SIDE_PATTERNS
 )
-
 
 # Tried only if none of the above is complete, so x, y, z beside elevation is not ambiguous.
 _MIXED: tuple[Triple, ...] = tuple(
@@ -67,12 +60,9 @@ _MIXED: tuple[Triple, ...] = tuple(
     if (a, b, c) not in _FAMILIES
 )
 
-
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
 
-
 _DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+|[+-]?\d+,\d+")
-
 
 _MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
 

@@ -25,9 +25,7 @@ from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
 REACH = 3.0
 """Default of the largest distance from the control mesh at which points are carried, in blocks."""
 
-
 _SLICE = 1 << 14  # points that a thread carries at a time; they fit in its cache
-
 
 _MISSED = 1 << 18  # points that libigl places at a time
 

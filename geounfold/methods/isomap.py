@@ -28,7 +28,6 @@ _TINY = 1e-12  # blocks: below this distance two points define no direction
 _OWN = 1e-9  # blocks: a point nearer than this to a block counts as the block
 _HASH = np.array([73_856_093, 19_349_663, 83_492_791], dtype=np.int64)
 
-
 # Values of Unfolding.jl:
 _NEAR = 50  # placed points whose distances to a block are kept
 _ROUNDS = 4  # rounds in which blocks are placed, each from the blocks of earlier rounds

@@ -30,7 +30,6 @@ from geounfold.synthetic.profile import Bend, Bump, Profile, Sinusoid
 BLOCKS = (2_000, 12_000)
 """Fewest and most blocks of a random body."""
 
-
 BREADTH = 2.5  # least extent of a sheet over its greatest thickness; strips are exempt
 
 
@@ -474,7 +473,6 @@ RECIPES: Mapping[str, Callable[[_Draft], None]] = MappingProxyType(
         "incomplete": _incomplete,
     }
 )
-
 
 FAMILIES: tuple[str, ...] = tuple(RECIPES)
 """Families of random bodies, named after their unusual property."""

@@ -17,9 +17,7 @@ assert METHODS  # loaded before a test puts a fake in the place of a module that
 
 SHIFT = np.array([1000.0, 0.0, -5.0])
 
-
 PLACE = ["unfolded_x", "unfolded_y", "unfolded_z", "stratigraphic"]
-
 
 RESULTS = [*PLACE, "location", "mesh_distance"]
 

@@ -43,7 +43,6 @@ GOOD = {
     "assay": [("A", 0.0, 10.0, 1.0), ("A", 10.0, 30.0, 4.0), ("B", 0.0, 10.0, 2.0)],
 }
 
-
 BAD_ROWS: dict[str, tuple[str, list[tuple[Any, ...]], list[str], list[tuple[float, float]]]] = {
     # by case: the table, rows added, the findings of these rows, hole A's intervals after it
     "no hole": ("assay", [("", 0.0, 10.0, 1.0)], ["no hole named"], [(0, 10), (10, 30)]),

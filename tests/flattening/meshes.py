@@ -28,7 +28,6 @@ EXACT = {
     "isomap": 0.1,
 }
 
-
 METHODS = sorted(FLATTENERS)
 
 

@@ -29,7 +29,6 @@ from tests.shapes import rotation
 # harmonic keeps neither lengths nor angles: test_harmonic.py holds its truths.
 SHAPELY = [m for m in METHODS if FLATTENERS[m].keeps != "nothing"]
 
-
 # Relative difference of lengths after a rigid motion.  Coordinates of 4e6 for a body of 350 leave
 # 1e-12 of rounding: measured 1.9e-11 at most over 20 rotations and orders of the vertices, with
 # OpenBLAS's Haswell and SkylakeX kernels alike.  The scaffold's frame has sides along the axes, so
@@ -146,7 +145,6 @@ def test_max_iter_is_reported():
 
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

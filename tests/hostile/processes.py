@@ -13,7 +13,6 @@ from pathlib import Path
 
 LONG = 120.0  # seconds after which a test gives up on a process; nothing is timed
 
-
 UNFOLD = ("unfold", "p.csv", "-o", "out.csv", "--summary", "s.json", "--map", "m.npz")
 
 

@@ -20,13 +20,10 @@ LINES = {
     signal.SIGHUP: (129, "geounfold: error: hung up; nothing was written\n"),
 }
 
-
 SAMPLES = ("--samples", "p.csv", "--samples-out", "q.csv")
-
 
 # Stages as pipeline.py, fitting.py, comparison.py and cli/commands name them.
 SHEET = ("reading", "frame", "hull", "split", "sheet", "map", "quality", "writing")
-
 
 THESIS = ("reading", "frame", "hull", "split", "thesis", "map", "quality", "writing")
 

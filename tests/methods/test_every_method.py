@@ -29,7 +29,6 @@ from tests.shapes import box
 
 POINTWISE = [name for name, method in METHODS.items() if not method.control]
 
-
 EVERY = list(METHODS)
 
 

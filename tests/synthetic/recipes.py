@@ -8,5 +8,4 @@ from geounfold.synthetic import (
 
 SMALL = [name for name in CASES if name not in ("large", "thin_wide")]
 
-
 NOISELESS = [name for name in SMALL if not CASES[name].noise]

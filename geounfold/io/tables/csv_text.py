@@ -25,7 +25,6 @@ _CHUNK = 1 << 20  # bytes unpacked at once
 _ROOM = 1 << 28  # bytes that every compressed table may unpack to
 _RATIO = 100  # times its size that a larger one may unpack to; tables of points: 3 to 10
 
-
 _FOREIGN = {
     b"PAR1": "a Parquet file: name it .parquet",
     b"\x1f\x8b": "compressed by gzip: name it .csv.gz",

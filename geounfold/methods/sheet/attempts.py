@@ -1,8 +1,8 @@
 """Attempts to fit the mid surface: a list, tried in order until the body does not contradict one.
 
-The hull alone does not tell how a sheet has to be fitted: smoothing that evens out staircases
-straightens hinges of few blocks' radius, and a half thickness that is kept from bending ends
-before the rim of a lens.  The blocks decide.  The measure of an attempt is its contradiction:
+No single fit to the hull suits every body.  Smoothing that evens out staircases straightens hinges
+of few blocks' radius; a half thickness that is kept from bending ends before the rim of a lens.  So
+the blocks judge each attempt.  Its measure is the contradiction:
 
 - on a lattice, the mean depth, in blocks, of the lattice sites on the wrong side of the horizons
   after the sheet was sharpened by them; infinite if no site could be used;
@@ -38,14 +38,14 @@ from geounfold.methods.sheet.sharpening.site_rules import SiteRules
 HOLDS = 0.008
 """Contradiction, in blocks, up to which an attempt is taken.
 
-Measured: 0.00002 to 0.006 for sheets that are right, on lattices and elsewhere; 0.02 and more for
-sheets that lost a limb.
+Measured: 0.00002 to 0.006 for correct sheets, on lattices and elsewhere; 0.02 and more for sheets
+that lost a limb.
 """
 
 CLEARLY = 0.6
 """Share of the first attempt's contradiction that the closer fit must stay below to be taken.
 
-Measured: 0.05 to 0.5 where the first attempt had lost a limb, 0.9 to 1.6 where the closer one had.
+Measured: 0.05 to 0.5 if the first attempt had lost a limb, 0.9 to 1.6 if the closer one had.
 """
 
 TAPERING = 0.1
@@ -60,7 +60,7 @@ EXPLAINED = 0.4
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One body, and what its mid surface is fitted to and judged by.
+    """One body: the data that its mid surface is fitted to and judged by.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Case:
     samples : HullSamples
         Vertices of the hull; in blocks, or in cells of ``unit`` blocks.
     cells : (k, 3) float
-        Blocks, or merged blocks, that set how far the sheet must reach; in the same unit.
+        Blocks, or merged blocks, in the same unit; the sheet must reach all of them.
     points : (n, 3) float
         Blocks, working units.
     sites : Sites or None
@@ -129,7 +129,7 @@ class Case:
         return FitSettings(smooth=self.smoothing) if self.tapering is None else _tapering(self)
 
     def judge(self, name: str, fitted: FittedSheet, rules: SiteRules) -> Trial:
-        """Return an attempt sharpened by the blocks, and how far they contradict it."""
+        """Return the trial of a fit: sharpened by the blocks, with its contradiction."""
         if not self.judged:
             return Trial(name, fitted, 0.0)
         if self.sites is None:
@@ -146,19 +146,19 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What became of an attempt.
+    """The outcome of an attempt.
 
     Attributes
     ----------
     name : str
-        The attempt's.
+        Name of the attempt.
     fitted : FittedSheet
-        The sheet, sharpened if ``sharpened`` says so.
+        The sheet; sharpened unless ``sharpened`` is empty.
     contradiction : float
-        How far the body contradicts it, in blocks; infinite if no lattice site could be used, NaN
-        if it was not judged.
+        Contradiction, in blocks (see the module); infinite if no lattice site could be used, NaN if
+        the attempt was not judged.
     sharpened : str
-        By what: lattice ``sites``, ``layers``, or nothing (empty).
+        What sharpened it: ``sites`` of the lattice, ``layers``, or nothing (empty).
     sites : Sites or None
         The lattice sites it was judged by.
     """
@@ -171,11 +171,11 @@ class Trial:
 
     @property
     def holds(self) -> bool:
-        """Whether the body does not contradict it."""
+        """Whether the contradiction is small enough for the attempt to be taken."""
         return self.contradiction <= HOLDS
 
     def row(self) -> dict[str, object]:
-        """Return its figures for the summary."""
+        """Return the figures for the summary."""
         return {
             "name": self.name,
             "explained": self.fitted.accepted,
@@ -216,7 +216,7 @@ def _tapering(case: Case) -> FitSettings:
 
 
 def _choosy(case: Case) -> FittedSheet | None:
-    """Fit to hull vertices whose normals agree more closely: a rim may pass for a horizon.
+    """Fit to hull vertices whose normals agree more closely, so that no rim is taken for a horizon.
 
     Only on a lattice whose blocks were not merged, and if enough of the hull is explained.
     """
@@ -230,7 +230,7 @@ def _closer(case: Case) -> FittedSheet | None:
     """Fit closer to the hull and let the sheet grow step by step.
 
     The smoothing that evens out staircases flattens a hinge of few blocks' radius.  The sheet then
-    runs straight on where the body bends, rejects the hull there, and keeps away from it; so it
+    runs straight past the bend, rejects the hull there, and keeps its distance from it.  So it
     never reaches the body's ends, which in overturned folds are long wedges.
     """
     return case.tried(
@@ -249,7 +249,7 @@ ATTEMPTS = (
 """The attempts, in the order in which they are tried."""
 
 _ROUGH = 1.25
-"""Factor on the smoothing length on staircases, of the last resort on a lattice.
+"""Factor on the smoothing length on staircases, for the last resort on a lattice.
 
 Lattice sites that contradict every attempt belong to a rougher body than a smooth sheet can follow.
 """

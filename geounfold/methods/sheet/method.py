@@ -1,4 +1,4 @@
-"""The sheet method on a body: ours."""
+"""The sheet method applied to a body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def sheet_method(body: PreparedBody) -> BodyFit:
     Raises
     ------
     SplitError, FlatteningError
-        As the stages do.
+        Raised by the stages (see `sheet_stages`).
     """
     result = sheet_stages(body, body.datum, body.reach)
     mesh = result.mesh

@@ -1,4 +1,4 @@
-"""What the sheet method made of one body."""
+"""The result of the sheet method for one body."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class SheetResult:
     mesh : SheetMesh
         The control mesh and its shell.
     trials : tuple of Trial
-        What every attempt to fit the mid surface gave; the last one was taken.
+        Every attempt to fit the mid surface; the last one was taken.
     """
 
     medial: MedialSheet

@@ -29,12 +29,12 @@ _LOOSE_SPRINGS = SpringOptions(tol=1e-4)
 _TOO_ROUGH = 0.12
 """Roughness of the smooth fit, in cells of merged blocks, above which the cells are too coarse.
 
-Measured: 0.03 to 0.08 where the sheet could be sharpened, 0.28 where it could not.
+Measured: 0.03 to 0.08 if the sheet could be sharpened, 0.28 if it could not.
 """
 
 
 def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
-    """Return the stages of the sheet method; other methods take their surfaces from them.
+    """Return the stages of the sheet method; other methods take their surfaces from here.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
     SplitError
         No part of the top has a parallel bottom; or merged blocks are too coarse for the body.
     ControlMeshError
-        The body meets its mid surface in separate parts; or, of merged blocks, the control mesh
+        The body meets its mid surface in separate parts; or blocks were merged and the control mesh
         could not be proved or does not hold every block.
     """
     with body.stage("sheet"):
@@ -68,7 +68,7 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
 
 
 def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:
-    """Return what the mid surface is fitted to and judged by."""
+    """Return the data that the mid surface is fitted to and judged by."""
     split, hull, coarse = body.split, body.hull, body.coarse
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     variance = np.zeros(3) if hull is None else hull.blur_variance(body.frame.sides)
@@ -127,5 +127,5 @@ def _horizons(fitted: FittedSheet, samples: HullSamples, taken: Trial) -> Horizo
 
 
 def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
-    """Return near-isometric parameters of a surface, (n, 2): springs, stopped early."""
+    """Return near-isometric parameters of a surface, (n, 2), from springs stopped early."""
     return flatten_surface(mesh, "spring", start=start, options=_LOOSE_SPRINGS, repair=False).uv

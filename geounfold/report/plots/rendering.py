@@ -30,15 +30,12 @@ window.Render()
 raise SystemExit(0 if window.SupportsOpenGL() else 3)
 """
 
-
 # A box's corners, and its faces by axis and side (0 low, 1 high).
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-
 
 _QUADS = np.array(
     [[[0, 1, 3, 2], [4, 6, 7, 5]], [[0, 4, 5, 1], [2, 3, 7, 6]], [[0, 2, 6, 4], [1, 5, 7, 3]]]
 )
-
 
 LIT: dict[str, Any] = {
     "show_edges": True,
@@ -48,9 +45,7 @@ LIT: dict[str, Any] = {
     "diffuse": 0.65,
 }
 
-
 _SHADE = np.array([0.74, 0.86, 1.0])  # brightness of faces across x, y and z
-
 
 _MAX_CELLS = 30_000_000  # of the grid that hidden blocks are found with: 30 MB
 

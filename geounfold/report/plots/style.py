@@ -13,13 +13,10 @@ from geounfold.errors import MissingDependencyError, OptionError
 
 Image = NDArray[np.uint8]
 
-
 Limits = tuple[float, float]
-
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 TOP, BOTTOM, RIM, UNDECIDED = "#0072B2", "#E69F00", "#999999", "#CC79A7"
-
 
 LIBRARIES = ("libX11.so.6", "libGL.so.1", "libEGL.so.1")
 

@@ -11,7 +11,6 @@ from geounfold.io.tables.points import PointTable
 
 NEEDS = {".omf": "omf", ".geoh5": "geoh5py", ".dxf": "ezdxf"}
 
-
 # National-grid coordinates in feet, as single precision cannot hold them.
 XYZ = np.array(
     [[2296021.09, 414095.85, 1 / 3], [2296031.1, 414095.8, -5e-324 + 1590.1], [2296021.0, 4e5, 0.0]]

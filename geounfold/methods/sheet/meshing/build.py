@@ -34,48 +34,47 @@ from geounfold.methods.sheet.mid_surface.surface import (
 Flatten = Callable[[TriMesh, Floats | None], Flattening]
 """``flatten(mesh, start)``: a surface laid flat from a start, (n, 2) or None."""
 
-
 CELL = 1.5
 """Side of the footprint's cells, in blocks."""
 
 PAD = 0.6
-"""Height of the mesh past the outermost blocks, in blocks, if offsets are constant."""
+"""Height of the mesh past the outermost blocks, in blocks, for constant offsets."""
 
 PAD_CAPPED = 1.0
-"""The same if offsets follow the blocks."""
+"""The same for offsets that follow the blocks."""
 
 SHELL = 3.0
-"""Distance past the control mesh that its shell reaches, in blocks."""
+"""Distance, in blocks, to which the shell reaches past the control mesh."""
 
 SHRINKS = 40
-"""Most steps of the repair."""
+"""Largest number of steps of the repair."""
 
-_WIDEST = 3.0  # side of the cells at most, blocks, on footprints of more than _MANY of them
+_WIDEST = 3.0  # blocks: largest side of the cells on footprints of more than _MANY cells
 _MANY = 8000
-_TURN = 0.1  # radians by which the surface may turn over one of these wider cells
-_TURN_MERGED = 0.25  # the same if blocks were merged; cells are as wide as it allows
+_TURN = 0.1  # radians by which the surface may turn across one of these wider cells
+_TURN_MERGED = 0.25  # the same if blocks were merged; it sets the cells' side
 _DILATION = 1  # rings of cells past the blocks
-_FOCAL = 0.9  # largest share of the focal distance that an offset takes
+_FOCAL = 0.9  # largest offset, as a share of the focal distance
 _FOCAL_REFINED = 0.95  # the same with cells of half the side
-_SLOPES = (0.3, 0.6, 1.2)  # slopes of the caps along the sheet, tried in order
+_SLOPES = (0.3, 0.6, 1.2)  # slopes of the caps (largest offsets) along the sheet, tried in order
 _SAFE = 0.7  # share of the caps within which the flattened parallel surfaces lie
 _FILTER = 3  # radius, in cells, of the filter on varying offsets
 
 
 @dataclass(frozen=True)
 class MeshPlan:
-    """What a control mesh is to be like.
+    """Settings of a control mesh.
 
     Attributes
     ----------
     flatten : callable
-        Lays a surface flat; see `Flatten`.
+        ``flatten(mesh, start)`` lays a surface flat from a start, (n, 2) or None.
     datum : str
         Which surface is flat: mid, top, bottom or proportional.
     cell : float
         Side of the footprint's cells, in blocks.
     shell : float
-        Distance past the control mesh that its shell reaches, in blocks.
+        Distance, in blocks, to which the shell reaches past the control mesh.
     """
 
     flatten: Flatten
@@ -86,21 +85,21 @@ class MeshPlan:
 
 @dataclass(frozen=True, eq=False)
 class SheetMesh:
-    """What the sheet method made of a body, in working units.
+    """The control mesh of a body by the sheet method, in working units.
 
     Attributes
     ----------
     control : ControlMesh
         Tetrahedra in both spaces.
     shell : ControlMesh or None
-        Tetrahedra around them, over the control mesh's vertices and others.
+        Tetrahedra around the control mesh; its vertices come first.
     flattenings : dict of Flattening
         The mid surface (``mid``) and the parallel surfaces above and below it (``top``,
         ``bottom``), over the same footprint, as they were flattened.
     layers : Layers
         The prisms.
     rungs : tuple of Rung
-        What every rung of the ladder gave that was needed; the last is the one taken.
+        Result of every rung of the ladder that was tried; the last is the one taken.
     surfaces : dict of (TriMesh, TriMesh)
         Mid, top and bottom surface, folded and unfolded, over the footprint.
     """
@@ -129,7 +128,7 @@ def register(A: Floats, B: Floats, weight: Floats) -> Floats:
 
 
 def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
-    """Return the feet of all blocks, each on its own limb (see FittedSheet.own_feet)."""
+    """Return the feet of all blocks, each on its own limb (`FittedSheet.own_feet`)."""
     return fitted.own_feet(points, (reach / 5, reach / 2, reach))
 
 
@@ -137,10 +136,10 @@ def block_feet(fitted: FittedSheet, points: Floats, reach: float) -> Foot:
 class _Nodes:
     """Places of the control mesh's nodes on the normals of the mid surface, (n, 3) each.
 
-    A mesh whose nodes lie on a curved surface is shorter than it, and lies on its inner side.
-    Nodes lifted by 1/24 of the second difference over a cell have chords as long as the arcs;
-    lifted by 1/12, the flat cells have the arcs' mean height (Simpson's rule).  The points at
-    height t are ``P + t normal`` of either pair.
+    A mesh whose nodes lie on a curved surface is shorter than the surface, and lies on its inner
+    side.  If the nodes are lifted by 1/24 of the second difference over a cell, chords are as long
+    as arcs; if lifted by 1/12, the flat cells have the arcs' mean height (Simpson's rule).  The
+    points at height t are ``P + t normal`` of either pair.
     """
 
     chord_points: Floats
@@ -185,8 +184,8 @@ def _flatten_sheet(
 ) -> _FlatSheet:
     """Flatten the mid surface and the parallel surfaces ``reach`` above and below it.
 
-    The fitted ``slip`` (n, 2) per height is the start of the latter two; their mean slip over
-    the ``profile`` is none.
+    The two parallel surfaces start from the fitted ``slip`` (n, 2) per height; their mean slip over
+    the ``profile`` is zero.
     """
     n = len(prints.U)
     P, normal = nodes.chord_points[:n], nodes.chord_normal[:n]
@@ -210,7 +209,7 @@ def _safely_flat(
     reach: tuple[float, float],
     flatten: Flatten,
 ) -> _FlatSheet:
-    """Flatten at the full reach, or nearer to the mid surface where that would fold over.
+    """Flatten at the full reach, or nearer to the mid surface if that would fold over.
 
     Slip is linear in height on a developable sheet, so nearer surfaces give the same slopes.
     """
@@ -222,11 +221,11 @@ def _safely_flat(
     return result
 
 
-_OFF = 1e-3  # blocks: rays towards other limbs start so far off the walls
-_HALF = 0.45  # of the way to another limb that a limb may take
-_TIP = 1.5  # blocks before the end of the sheet whose thickness is taken for the tip's
-_FARTHEST = 8.0  # blocks past the last one that a sheet may go on, too thin for blocks
-_STRAIGHT = 1e-9  # curvature below which a surface has no focal distance to speak of
+_OFF = 1e-3  # blocks: distance from top or bottom at which rays towards other limbs start
+_HALF = 0.45  # share of the distance to another limb that the mesh may use
+_TIP = 1.5  # blocks: distance before the sheet's end at which the tip's thickness is measured
+_FARTHEST = 8.0  # blocks: how far a sheet too thin for blocks goes on past the last one
+_STRAIGHT = 1e-9  # curvature below which a surface counts as plane, without a focal distance
 
 
 def _focal_caps(curvature: Floats, focal: float) -> Floats:
@@ -234,7 +233,7 @@ def _focal_caps(curvature: Floats, focal: float) -> Floats:
 
 
 def _offsets(columns: Columns, foot: Foot, caps: Floats) -> Floats:
-    """Return offsets (2, n) that follow the blocks under caps (2, n)."""
+    """Return offsets (2, n) that follow the blocks, at most the caps (2, n)."""
     prints, use = columns.prints, foot.miss < 0.5
     need = [prints.cell_max(s * foot.t, use) for s in (1.0, -1.0)]
     follow = [prints.at_nodes(q, _FILTER) + PAD_CAPPED for q in need]
@@ -242,10 +241,10 @@ def _offsets(columns: Columns, foot: Foot, caps: Floats) -> Floats:
 
 
 def _room(columns: Columns, share: float) -> Floats:
-    """Return how far normals may run above and below, (2, n).
+    """Return the largest heights of the mesh above and below, (2, n).
 
-    A share of the way to where they meet their neighbours; and, past top and bottom, not quite
-    half of the way to another limb.
+    A share of the distance at which neighbouring normals meet; and, past top and bottom, less than
+    half of the distance to another limb.
     """
     P, normal = (a[: columns.count] for a in (columns.P, columns.normal))
     sides = (columns.high, columns.low)
@@ -261,10 +260,10 @@ def _room(columns: Columns, share: float) -> Floats:
 
 
 def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
-    """Return caps (2, n) on the offsets: the room there is, of bounded slope.
+    """Return caps (2, n) on the offsets: the largest heights, with a bounded slope.
 
-    At a hinge the mesh's border has to run on nearly parallel to the sheet: where it dips
-    towards a focal line and out again, columns cross those two away.
+    At a hinge the mesh's border has to stay nearly parallel to the sheet.  If it dips towards a
+    focal line and out again, a column crosses the column next but one.
     """
     F, U = columns.prints.F, columns.prints.U
     return np.stack([bounded_slope(cap, U, F, slope) for cap in _room(columns, share)])
@@ -273,10 +272,10 @@ def _sloping_caps(columns: Columns, share: float, slope: float) -> Floats:
 def _footprint(
     sheet: MidSurface, U: Floats, plan: MeshPlan, unit: float, side: float | None
 ) -> Footprint:
-    """Return the footprint of feet U (b, 2), with cells as wide as size and bends allow.
+    """Return the footprint of feet U (b, 2), with cells as wide as its size and curvature allow.
 
-    ``unit``: side of the cells that blocks were merged into, 1 where they were not; ``side``:
-    that of the footprint's cells, where it is not left to size and bends.
+    ``unit``: side of the cells that blocks were merged into, 1 if they were not; ``side``: side of
+    the footprint's cells, None to choose it by size and curvature.
     """
     angle = principal_direction(sheet, U)
 
@@ -295,7 +294,7 @@ def _footprint(
 
 
 def _bend(sheet: MidSurface, U: Floats) -> float:
-    """Return the curvature that one in a hundred places U (n, 2) exceeds."""
+    """Return the curvature exceeded at one in a hundred places U (n, 2)."""
     k1, k2 = principal_curvatures(sheet.jet(U))
     return max(float(np.percentile(np.maximum(k1, -k2), 99)), 1e-9)
 
@@ -307,7 +306,7 @@ def _columns(
     cell: float | None,
     plan: MeshPlan,
 ) -> Columns:
-    """Return the columns over the blocks' footprint; ``cell`` None chooses its cells' side."""
+    """Return the columns over the blocks' footprint; ``cell`` None: side chosen by curvature."""
     sheet = fitted.sheet
     prints = _footprint(sheet, foot.U, plan, fitted.unit, cell)
     every = np.concatenate([prints.U, prints.ring.U])
@@ -343,10 +342,10 @@ def _columns(
 
 
 def _profile(fitted: FittedSheet, foot: Foot) -> CrossSection:
-    """Return the sections of the mid surface.
+    """Return the cross-section of the mid surface.
 
-    They reach as far as the blocks within one block of it did before they slipped; and on from
-    there to where a layer that tapers comes to nothing, which is too thin for a block.
+    It spans the places, before slip, of the blocks within one block of the mid surface.  If the
+    layer tapers, it goes on from there to zero thickness, past the last block.
     """
     axes = fold_axes(fitted.sheet, foot.U)
     near = np.flatnonzero(np.abs(foot.t) < 1)
@@ -368,7 +367,7 @@ def _profile(fitted: FittedSheet, foot: Foot) -> CrossSection:
 
 
 def _reach(foot: Foot) -> float:
-    """Return the offset that holds every block."""
+    """Return the least offset that holds every block."""
     return float(np.abs(foot.t[foot.miss < 0.5]).max()) + PAD
 
 
@@ -381,9 +380,9 @@ def build_control(
 ) -> SheetMesh:
     """Return the control mesh that holds the blocks, in both spaces (see SheetMesh).
 
-    Prism edges are normals of the mid surface; surfaces parallel to it above and below are
-    flattened on their own and registered rigidly to the flat mid surface, which reproduces
-    flexural slip with zero mean slip over the profile (the pin line).
+    Prism edges are normals of the mid surface.  Surfaces parallel to it above and below are
+    flattened on their own and registered rigidly to the flat mid surface.  This reproduces flexural
+    slip with zero mean slip over the cross-section (the pin line).
 
     Parameters
     ----------
@@ -392,11 +391,11 @@ def build_control(
     horizons : Horizons
         Top and bottom, for the stratigraphic coordinate.
     points : (n, 3) float
-        What the sheet was fitted to, working units.
+        Points that the sheet was fitted to, working units.
     blocks : (b, 3) float
-        Blocks as they were given, which the mesh has to hold.
+        Blocks as the user gave them; the mesh has to hold all of them.
     plan : MeshPlan
-        What the mesh is to be like.
+        Settings of the mesh.
     """
     foot = block_feet(fitted, points, reach=10.0 * fitted.unit)
     columns = _columns(fitted, horizons, foot, None, plan)

@@ -19,9 +19,9 @@ class Ring:
     Attributes
     ----------
     U : (r, 2) float
-        Parameters of the nodes that the footprint has not.
+        Parameters of the ring's own nodes.
     F : (k, 3) int
-        Triangles; nodes from ``len(footprint.U)`` on are the ring's own.
+        Triangles over the footprint's nodes, then the ring's.
     """
 
     U: Floats
@@ -30,16 +30,16 @@ class Ring:
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Square cells of the parameter plane that hold feet of blocks, cut into triangles.
+    """Square cells of the parameter plane that hold feet of blocks, each cut into two triangles.
 
     Attributes
     ----------
     U : (n, 2) float
         Parameters of the nodes.
     F : (m, 3) int
-        Triangles, counter-clockwise; no two parts touch in nothing but a corner.
+        Triangles, counter-clockwise; no two parts touch only in a corner.
     weight : (n,) float
-        Number of blocks around each node, capped at the median: weights of registrations.
+        Number of blocks around each node, capped at the median; weights of the registration.
     of_cell : (m,) int
         Flat index of every triangle's cell.
     held : (m,) bool
@@ -71,7 +71,7 @@ class Footprint:
     ring: Ring
 
     def without(self, nodes: Ints) -> Footprint:
-        """Return the footprint whose cells at some nodes that hold no feet are the ring's."""
+        """Return the footprint with its empty cells at some nodes given to the ring."""
         cells = np.zeros(self.shape, dtype=bool)
         dropped = ~self.held & np.isin(self.F, nodes).any(axis=1)
         cells.ravel()[self.of_cell] = True
@@ -85,7 +85,7 @@ class Footprint:
     def at_nodes(self, cells: Floats, reach: int) -> Floats:
         """Return a cell field as a smooth upper bound at the nodes, (n,).
 
-        A maximum filter of radius ``reach`` cells, then a mean filter it dominates.
+        A maximum filter of radius ``reach`` cells, then a mean filter no wider, so the bound holds.
         """
         top = ndi.maximum_filter(cells, 2 * reach + 1)
         padded = np.pad(top, ((0, 1), (0, 1)), mode="edge")
@@ -110,7 +110,7 @@ def principal_direction(sheet: MidSurface, U: Floats) -> float:
 def _triangles(cells: Bools) -> Ints:
     """Return two triangles per set cell over the node grid, diagonals alternating.
 
-    The first of every cell, in the cells' order, then the second.
+    The first triangle of every cell comes first, in the order of the cells, then the second.
     """
     i, j = np.nonzero(cells)
     width = cells.shape[1] + 1
@@ -127,9 +127,9 @@ _SQUARE = np.ones((3, 3), dtype=bool)
 
 
 def _widened(cells: Bools, rings: int) -> Bools:
-    """Return cells with rings of others around them, and corners filled where only they touch.
+    """Return cells with rings of others around them; corners that alone connect cells are filled.
 
-    Cells that touch in a corner alone would make a mesh whose border is no manifold.
+    Cells that touch only in a corner would make a mesh whose border is no manifold.
     """
     out = np.asarray(ndi.binary_dilation(cells, _SQUARE, iterations=rings)) if rings else cells
     while True:
@@ -157,17 +157,17 @@ def footprint(U: Floats, angle: float, cell: float, dilation: int, rings: int = 
     dilation : int
         Rings of cells added around those that hold feet.
     rings : int
-        Rings of cells around all of these, kept apart (see Ring).
+        Rings of cells around these, returned as ``ring``.
 
     Raises
     ------
     ControlMeshError
-        Cells that are not one part.
+        The cells are not connected.
     """
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     V = U @ turn
     margin = dilation + rings + 1
-    low = V.min(axis=0) - (1.63 + margin) * cell  # no foot on a cell's very edge
+    low = V.min(axis=0) - (1.63 + margin) * cell  # keeps feet off the cells' edges
     shape = np.ceil((V.max(axis=0) - low) / cell).astype(int) + 2 + margin
     at = np.floor((V - low) / cell).astype(np.int64)
     count = np.bincount(at[:, 0] * shape[1] + at[:, 1], minlength=shape.prod()).reshape(shape)

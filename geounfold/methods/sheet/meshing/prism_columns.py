@@ -1,4 +1,4 @@
-"""The columns of a control mesh: all of it but how far it reaches above and below."""
+"""The columns of a control mesh: everything except its heights above and below."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from geounfold.methods.sheet.meshing.prism_layers import Layers
 from geounfold.methods.sheet.meshing.shell import Surround, surround
 from geounfold.methods.sheet.meshing.top_and_bottom import Horizons
 
-_BARE = 0.15  # blocks past top and bottom, where there is no room for more
+_BARE = 0.15  # blocks: height past top and bottom if there is no room for more
 
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """Prisms laid out in both spaces, with the shell around them.
+    """Prisms in both spaces, with the shell around them.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class Laid:
     folded, unfolded : (v, 3) float
         Vertices in both spaces, the body's first.
     stratigraphic : (v,) float
-        Stratigraphic coordinate of each.
+        Stratigraphic coordinate of each vertex.
     node : (v,) int
-        Node of each.
+        Node of each vertex.
     T, shell : (m, 4), (s, 4) int
         Tetrahedra of the body and of the shell.
     inner : int
@@ -64,7 +64,7 @@ class Laid:
         )
 
     def taking_in(self, rows: Ints) -> Laid:
-        """Return the prisms with some of the shell's tetrahedra as the body's."""
+        """Return the prisms with some of the shell's tetrahedra added to the body's."""
         moved = np.zeros(len(self.shell), dtype=bool)
         moved[rows] = True
         used = np.unique(self.shell[moved])
@@ -94,7 +94,7 @@ class Laid:
         )
 
     def shell_mesh(self) -> ControlMesh | None:
-        """Return the shell, over all vertices; None where there is none."""
+        """Return the shell, over all vertices; None if it is empty."""
         if not len(self.shell):
             return None
         return ControlMesh(
@@ -111,7 +111,7 @@ class Columns:
     Attributes
     ----------
     prints : Footprint
-        The footprint, n nodes, and the ring around it, r more.
+        The footprint with n nodes; the ring around it has r more.
     P, normal : (n + r, 3) float
         Mid surface and its unit normals at the nodes.
     slip : (n + r, 2) float
@@ -123,13 +123,13 @@ class Columns:
     low, high : (n,) float
         Heights at which the nodes' normals meet bottom and top.
     flattenings : dict of Flattening
-        How the mid surface and its parallel surfaces were flattened.
+        Flattenings of the mid surface and its parallel surfaces.
     horizons : Horizons
         Top and bottom, for the stratigraphic coordinate.
     datum : Datum
         Which surface is flat.
     reach : float
-        How far the shell shall go past the body, in blocks.
+        Distance, in blocks, to which the shell should reach past the body.
     """
 
     prints: Footprint
@@ -174,12 +174,12 @@ class Columns:
         )
 
     def bare(self, layers: Layers) -> Layers:
-        """Return prisms that reach little farther than top and bottom."""
+        """Return prisms that reach only `_BARE` past top and bottom."""
         up, down = self.high + _BARE, -self.low + _BARE
         return replace(layers, up=np.maximum(up, _BARE), down=np.maximum(down, _BARE))
 
     def narrowed(self, nodes: Ints) -> Columns:
-        """Return the columns without those at some nodes that hold no block."""
+        """Return the columns without the empty ones at some nodes."""
         return replace(self, prints=self.prints.without(nodes))
 
     def surround(self, layers: Layers) -> Surround:
@@ -196,14 +196,14 @@ class Columns:
         )
 
     def lay_out(self, around: Surround, body: tuple[Floats, Floats] | None = None) -> Laid:
-        """Return prisms and shell in both spaces.
+        """Return the prisms and their shell in both spaces.
 
         Parameters
         ----------
         around : Surround
             The prisms.
         body : (folded, unfolded), optional
-            Places of the body's vertices, (v, 3) each, where they were moved.
+            Places of the body's vertices, (v, 3) each, if they were moved.
         """
         layer, node = around.vertices
         height = np.stack(around.heights)[layer, node]

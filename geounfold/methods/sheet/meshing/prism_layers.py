@@ -1,4 +1,4 @@
-"""Prism layers along the mid surface's normals, and the ladder that keeps them upright."""
+"""Prism layers along the mid surface's normals, and the shrinking that keeps them upright."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from geounfold.geometry.mesh import Floats, Ints
 from geounfold.geometry.prisms import prism_tets
 
 FRACTIONS = (-1.0, -0.6, 0.0, 0.6, 1.0)
-"""Layers as shares of the offset on their side, from the bottom up."""
+"""Heights of the layers as shares of the offset on their side, from the bottom up."""
 
 FINE_FRACTIONS = (-1.0, -0.8, -0.6, -0.3, 0.0, 0.3, 0.6, 0.8, 1.0)
-"""The same where prisms are refined."""
+"""The same for refined prisms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class Layers:
     curvature : (2, n) float
         Curvature that makes normals converge above (row 0) and below (row 1).
     up, down : (n,) float
-        Offsets: how far the mesh reaches above and below the mid surface.
+        Offsets: heights of the mesh above and below the mid surface.
     fractions : tuple of float
-        Layers as shares of the offset on their side, from -1 at the bottom up to 1.
+        Heights of the layers as shares of the offset on their side, from -1 at the bottom to 1.
     """
 
     P: Floats
@@ -73,17 +73,17 @@ class Layers:
         return out
 
     def tets(self) -> Ints:
-        """Return the tetrahedra, right-handed where upright."""
+        """Return the tetrahedra, right-handed if upright."""
         return prism_tets(self.F, len(self.P), len(self.fractions))
 
 
 def bounded_slope(values: Floats, U: Floats, F: Ints, slope: float) -> Floats:
-    """Return the largest field (n,) below values that changes by no more than ``slope`` per length.
+    """Return the largest field (n,) below the values whose slope is at most ``slope``.
 
     Parameters
     ----------
     values : (n,) float
-        At the nodes of triangles F (m, 3) with places U (n, 2).
+        Values at the nodes of triangles F (m, 3) with places U (n, 2).
     """
     E = unique_edges(F)
     rise = slope * lengths(U, E)
@@ -107,7 +107,7 @@ def neighbour_mean(F: Ints, n: int) -> sp.csr_array:
 def shrink(layers: Layers, nodes: Ints, mean: sp.csr_array, factor: float = 0.9) -> Layers:
     """Return the layers with the offsets at some nodes shrunk on the converging side only.
 
-    Neighbours follow half-way, so that the mesh's top and bottom stay smooth.
+    Neighbours are shrunk half as much, so that the mesh's top and bottom stay smooth.
     """
     offsets = []
     bend = np.stack([layers.curvature[0] * layers.up, layers.curvature[1] * layers.down])

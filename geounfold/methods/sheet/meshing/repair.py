@@ -1,7 +1,7 @@
-"""From offsets to a control mesh that is proved one-to-one: the rungs, and what each gave.
+"""From offsets to a control mesh that is proved one-to-one: the rungs and the result of each.
 
-Every rung lays the prisms out and examines them as the certificate does: exact volumes in both
-spaces, a boundary that does not cross itself.  The first that has no flaw is taken.
+Every rung lays the prisms out and examines them like the certificate: exact volumes in both spaces,
+and a boundary that does not cross itself.  The first rung without a flaw is taken.
 """
 
 from __future__ import annotations
@@ -25,30 +25,30 @@ from geounfold.methods.sheet.meshing.prism_layers import (
 from geounfold.methods.sheet.meshing.shell import less
 from geounfold.methods.sheet.meshing.tents import with_tents
 
-_BLENDS = 8  # rounds of falling back to nearer offsets
-_BLEND = 0.6  # largest slope of the offsets between the two
-_MOVABLE = 0.03  # share of the vertices beyond which nothing is untangled
-_FEW = 0.002  # share of the blocks in the shell up to which they are taken into the body
-_TENTS = 0.02  # share of the blocks up to which tents are raised over them
+_BLENDS = 8  # rounds that replace offsets by smaller ones
+_BLEND = 0.6  # largest slope of the offsets where they change from one to the other
+_MOVABLE = 0.03  # largest share of the vertices that is untangled
+_FEW = 0.002  # largest share of the blocks in the shell that is taken into the body
+_TENTS = 0.02  # largest share of the blocks that tents are raised over
 _TRIMS = 8  # rounds of trimming before the shell is given up
 
 
 @dataclass(frozen=True)
 class Rung:
-    """What one rung of the ladder gave.
+    """Result of one rung of the ladder.
 
     Attributes
     ----------
     name : str
-        constant, capped or refined as laid out; blended, untangled or shrunk where mended.
+        constant, capped or refined for prisms as laid out; blended, untangled or shrunk for mended
+        ones.
     inverted_folded, inverted_unfolded, crossing_folded, crossing_unfolded, unglued : int
-        Flaws of the body's tetrahedra: how many are inverted, pairs of border faces that cross,
-        vertices and tetrahedra where they are not glued to a manifold.
+        Flaws of the body's tetrahedra: number inverted, pairs of border faces that cross, and
+        vertices and tetrahedra at which the mesh is no manifold.
     outside, lost : int or None
-        Blocks that they do not hold, and those that the shell does not hold either; None where
-        that was not asked.
+        Blocks outside the tetrahedra, and blocks outside the shell too; None if not counted.
     steps : int
-        Steps of blending or shrinking it took, or vertices it started to untangle from.
+        Steps of blending or shrinking; for untangling, vertices of flawed tetrahedra at its start.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Rung:
 
     @property
     def flaws(self) -> int:
-        """How many flaws were left."""
+        """Number of flaws left."""
         return (
             self.inverted_folded
             + self.inverted_unfolded
@@ -75,7 +75,7 @@ class Rung:
 
 @dataclass(frozen=True, eq=False)
 class Climbed:
-    """The ladder's result: the prisms taken, whether they are proved, and every rung's record."""
+    """Result of the ladder: the prisms taken, whether they are proved, and all rungs tried."""
 
     columns: Columns
     laid: Laid
@@ -100,7 +100,7 @@ class _Exam:
 
     @property
     def vertices(self) -> Ints:
-        """Vertices of the tetrahedra at fault."""
+        """Vertices of the flawed tetrahedra."""
         found = [self.gluing.misglued]
         found += [f.elements(self.gluing) for f in (self.folded, self.unfolded)]
         bad = self.gluing.T[np.concatenate(found)].ravel()
@@ -125,19 +125,19 @@ def climb(
 ) -> Climbed:
     """Return the first rung's prisms that are proved and hold every block.
 
-    The shell may hold some of them.  Where none does, those that are proved and lose the fewest
-    blocks; where none is proved, the fewest flaws are mended.
+    The shell may hold some of the blocks.  If no rung holds all of them, the proved prisms that
+    lose the fewest blocks are returned; if none is proved, those with the fewest flaws are mended.
 
     Parameters
     ----------
     rungs : iterable of (name, callable)
-        What to try, in order; each callable returns columns and offsets on them.  Of several by
-        one name each reaches farther than the one before: where that could not be proved or
-        mended, the next is not tried.
+        Rungs in the order in which they are tried; each callable returns columns and offsets on
+        them.  Of several rungs of one name, each reaches farther than the one before; it is not
+        tried if that could not be proved or mended.
     points : (n, 3) float
         The blocks, working units.
     shrinks : int
-        Most steps of shrinking around what is wrong, from the best of the rungs.
+        Largest number of steps of shrinking around flaws, starting from the best rung.
     """
     records: list[Rung] = []
     held: list[tuple[int, int, int, Columns, Laid]] = []
@@ -177,9 +177,9 @@ def climb(
 def _blended(
     columns: Columns, layers: Layers, near: Layers, exam: _Exam
 ) -> tuple[Columns, Laid | None, Rung]:
-    """Return prisms that reach no farther than near ones around what is wrong.
+    """Return prisms with smaller offsets around the flaws.
 
-    Columns there that hold no block are left out.  None where they are not proved.
+    Empty columns there are left out.  None if the prisms are not proved.
     """
     mean, n = neighbour_mean(layers.F, len(layers.P)), len(layers.P)
     back = np.zeros(n, dtype=bool)
@@ -199,12 +199,11 @@ def _blended(
 
 
 def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:
-    """Return the prisms with what else it takes to hold a few points that they do not.
+    """Return the prisms extended to hold a few points that lie outside them.
 
-    Tents are raised over points that the shell does not hold either, and tetrahedra of the shell
-    that hold points become the body's.  Where many points are outside, those in the shell are
-    left there.  With the prisms the number of points outside the body's tetrahedra, and of those
-    that nothing holds.
+    Tents are raised over points outside the shell, and tetrahedra of the shell that hold points
+    become the body's.  If many points are outside, those in the shell stay there.  Also returned:
+    the number of points outside the body's tetrahedra, and of those in no tetrahedron.
     """
     missed = points[TetIndex(laid.folded, laid.T).locate(points) < 0]
     if not len(missed):
@@ -227,7 +226,7 @@ def _in_shell(laid: Laid, points: Floats) -> Ints:
 
 
 def _untangled(columns: Columns, layers: Layers, exam: _Exam) -> tuple[Laid | None, Rung]:
-    """Return the prisms after moving as few vertices as it takes; None where it did not do."""
+    """Return the prisms with as few vertices moved as possible; None if flaws are left."""
     laid = columns.lay_out(columns.surround(layers)).without_shell()
     bad = np.unique(exam.vertices)
     if len(bad) > _MOVABLE * laid.inner:
@@ -246,7 +245,7 @@ def _shrunk(
     points: Floats,
     shrinks: int,
 ) -> Climbed:
-    """Return prisms whose flaws are shrunk away; or, as they were, unproved."""
+    """Return prisms with offsets shrunk until they are proved; unchanged if they never are."""
     first, mean = layers, neighbour_mean(layers.F, len(layers.P))
     for step in range(1, shrinks + 1):
         layers = shrink(layers, np.unique(exam.vertices % len(layers.P)), mean)
@@ -263,9 +262,9 @@ def _shrunk(
 def _proved(
     columns: Columns, layers: Layers, body: tuple[Floats, Floats] | None = None
 ) -> tuple[Laid | None, _Exam]:
-    """Return the prisms with as much of their shell as can be proved; None where they cannot.
+    """Return the prisms with as much of their shell as can be proved; None if they are not proved.
 
-    With them the examination of the body's tetrahedra, or of the whole where that passed.
+    Also returned: the examination of the body's tetrahedra, or of the whole if that passed.
     """
     around = columns.surround(layers)
     laid = columns.lay_out(around, body)

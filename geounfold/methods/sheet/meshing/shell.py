@@ -1,8 +1,8 @@
-"""The shell around a control mesh: where points outside the body are carried.
+"""The shell around a control mesh, which carries points outside the body.
 
-The prisms go on past the body, above, below and past the rim, as far as asked for and as there is
-room: short of the mid surface's focal distance, and of other limbs.  It is made of the same
-tetrahedra in both spaces, so that what it carries comes back exactly.
+The prisms go on past the body, above, below and past the rim, up to the reach.  They end short of
+the mid surface's focal distance, and of other limbs.  The shell has the same tetrahedra in both
+spaces, so that a point carried by it comes back exactly.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from geounfold.methods.sheet.meshing.prism_layers import Layers, bounded_slope
 from geounfold.methods.sheet.mid_surface.normal_equations import graph_laplacian, spd_solver
 
 _LEAST = 0.2  # share of the reach below which a node gets no shell
-_SHARE = 0.45  # of the way to another limb that a limb's shell may take
-_FOCAL = 0.95  # of the focal distance that the shell may reach
+_SHARE = 0.45  # share of the distance to another limb that a shell may use
+_FOCAL = 0.95  # share of the focal distance that the shell may reach
 _SLOPE = 0.6  # largest change of the shell's height along the sheet
-_STEP = 1e-3  # blocks: rays towards other limbs start so far off the border
+_STEP = 1e-3  # blocks: distance from the border at which rays towards other limbs start
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +34,11 @@ class Surround:
     layers : Layers
         The body's prisms.
     whole : Layers
-        The same nodes and those of the ring; offsets of the ring's nodes go on from the body's.
+        The same nodes and those of the ring; the body's offsets are continued to the ring.
     ring : (k, 3) int
         Triangles of the ring around the footprint, nodes of ``whole``.
     up, down : (w,) float
-        How far the shell reaches past the offsets, above and below each node of ``whole``.
+        Height of the shell past the offsets, above and below each node of ``whole``.
     """
 
     layers: Layers
@@ -49,7 +49,7 @@ class Surround:
 
     @property
     def none(self) -> bool:
-        """Whether nothing is left of the shell."""
+        """Whether the shell is empty."""
         return not (len(self.ring) or self.up.any() or self.down.any())
 
     @property
@@ -60,7 +60,7 @@ class Surround:
 
     @property
     def vertices(self) -> tuple[Ints, Ints]:
-        """Layer (in ``heights``) and node of every vertex, (v,) each: those of the body first."""
+        """Layer (in ``heights``) and node of every vertex, (v,) each; the body's vertices first."""
         n, count = len(self.layers.P), len(self.layers.fractions)
         body = np.divmod(np.arange(n * count), n)
         used = np.zeros(len(self.whole.P), dtype=bool)
@@ -73,12 +73,12 @@ class Surround:
         return np.concatenate([body[0] + 1, layer]), np.concatenate([body[1], node])
 
     def tets(self) -> Ints:
-        """Return the shell's tetrahedra, right-handed where upright, rows of ``vertices``."""
+        """Return the shell's tetrahedra, right-handed if upright, as rows of ``vertices``."""
         w, count = len(self.whole.P), len(self.layers.fractions)
         layer, node = self.vertices
         number = np.full((count + 2, w), -1, dtype=np.int64)
         number[layer, node] = np.arange(len(layer))
-        # Where the shell has no height its vertices are those of the layer below.
+        # If the shell has no height at a node, the vertex there is that of the layer below.
         number[0] = np.where(number[0] < 0, number[1], number[0])
         number[-1] = np.where(number[-1] < 0, number[-2], number[-1])
         slabs = []
@@ -111,14 +111,14 @@ def surround(
     P, normal : (n + r, 3) float
         Mid surface and its normals at the body's nodes and the ring's.
     U, slip : (n + r, 2) float
-        Parameters there, and the fitted slip per height: what the ring's flat places are but
-        for the body's departure from them, which goes on harmonically.
+        Parameters there, and the fitted slip per height.  They predict the flat places; the body's
+        departure from this prediction is continued harmonically to the ring.
     curvature : (2, n + r) float
         See Layers.
     ring : (k, 3) int
         Triangles of the ring.
     reach : float
-        How far the shell shall go, in blocks.
+        Largest height of the shell, in blocks.
     """
     n = len(layers.P)
     F = np.concatenate([layers.F, ring])
@@ -161,10 +161,10 @@ def _continued(F: Ints, known: Floats, count: int) -> Floats:
 
 
 def _room(whole: Layers, body: Ints, U: Floats, reach: float) -> tuple[Floats, Floats]:
-    """Return how far the shell may go above and below each node, (w,): 0 or some of the reach.
+    """Return the largest height of the shell above and below each node, (w,): 0 up to the reach.
 
-    Short of the focal distance, and of the middle between two limbs; nowhere much more than
-    nearby.
+    The shell ends short of the focal distance and of the middle between two limbs, and its slope
+    along the sheet is bounded.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def _room(whole: Layers, body: Ints, U: Floats, reach: float) -> tuple[Floats, F
     U : (w, 2) float
         The nodes' parameters.
     reach : float
-        As far as the shell shall go.
+        Largest height of the shell, in blocks.
     """
     top, bottom = (whole.P + q[:, None] * whole.normal for q in (whole.up, -whole.down))
     n = len(whole.P)
@@ -194,14 +194,14 @@ def _room(whole: Layers, body: Ints, U: Floats, reach: float) -> tuple[Floats, F
 
 
 def _shortened(room: Floats, reach: float) -> Floats:
-    """Return the room, none where it is too little."""
+    """Return the heights, set to 0 if they are too small."""
     return np.where(room < _LEAST * reach, 0.0, room)
 
 
 def less(around: Surround, touched: Bools) -> Surround:
-    """Return the shell halved at some nodes (w,), and none where little is left.
+    """Return the shell with halved height at some nodes (w,), 0 if little is left.
 
-    Triangles of the ring at a node that comes to have no shell above or below are left out.
+    Triangles of the ring at a node left without a shell above and below are removed.
     """
     reach = float(max(around.up.max(), around.down.max()))
     up, down = (np.where(touched, _shortened(q / 2, reach), q) for q in (around.up, around.down))

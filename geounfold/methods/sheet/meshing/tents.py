@@ -1,8 +1,9 @@
 """Tents: single tetrahedra over the border of a mesh, for blocks that lie just outside it.
 
-At an inner hinge a block may lie where the sheet's normals have crossed, so that no prism can
-reach it.  A tent stands on the border's nearest face with the block under its tip, and its tip is
-carried as the element behind that face would: the map goes on there, and comes back exactly.
+At an inner hinge a block may lie beyond the line on which the sheet's normals cross, so that no
+prism can reach it.  A tent is a tetrahedron on the nearest face of the border, with the block just
+below its tip.  The tip is carried by the affine map of the element behind that face, so the map is
+continued and has an exact inverse.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.mapping.certificate import Gluing, examine
 from geounfold.methods.sheet.meshing.prism_columns import Laid
 
-_TIP = 0.05  # blocks: how far past its block a tent's tip stands
-_MOST = 2000  # tents that are tried at once
+_TIP = 0.05  # blocks: height of a tent's tip above its block
+_MOST = 2000  # largest number of tents tried at once
 _ROUNDS = 6
 
 
@@ -34,7 +35,7 @@ def with_tents(laid: Laid, points: Floats) -> tuple[Laid, Ints]:
     Returns
     -------
     Laid
-        Proved as well; tents are part of its shell.
+        The prisms with tents, proved too; tents are part of the shell.
     (j,) int
         Rows of the points without one.
     """
@@ -50,9 +51,9 @@ def with_tents(laid: Laid, points: Floats) -> tuple[Laid, Ints]:
 
 
 def _raised(laid: Laid, points: Floats) -> tuple[Laid, Bools]:
-    """Return the prisms with a tent over each point that leaves them proved, and which those are.
+    """Return the prisms with tents, and which points have one: as many as leave them proved.
 
-    Of several points over one face the farthest gets the tent; the others may lie in it.
+    If several points lie over one face, the farthest gets the tent; the others may lie inside it.
     """
     T = laid.all_tets
     gluing = Gluing.of(T)

@@ -1,9 +1,10 @@
 """Top and bottom as heights over the flat mid surface, for the stratigraphic coordinate.
 
-They are fitted to the hull, and then, on a lattice, moved until they separate blocks from empty
-sites, as the sheet was (see `occupancy`).  What the sites leave open, on limbs along a lattice
-plane say, the hull settles, where it can: a sheet of a few blocks is no thicker than the hull is
-blurred, and there it is the sharpened half thickness that does.
+Both are fitted to the hull.  On a lattice they are then moved until they separate blocks from empty
+sites, like the sheet before (`sharpening.by_lattice_sites`).  The sites do not fix the heights
+everywhere, for example not on limbs along a lattice plane; there the heights of the hull are kept.
+A sheet of a few blocks is no thicker than the blur of the hull: its start is the sharpened half
+thickness instead.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ _AGREE = 0.9
 """Cosine between a hull normal and the mid surface's below which a hull vertex is rim."""
 
 _EROSION = 0.5
-"""Distance kept from the rim, in blocks: hulls are rounded there."""
+"""Distance kept from the rim, in blocks, because hulls are rounded there."""
 
 _MISFIT = 2.5
 """Departure from the half thickness, in blocks, above which a hull vertex is not used."""
@@ -43,15 +44,15 @@ _STIFFNESS = 1e-4
 """Weight that draws the heights to the half thickness where there are no hull vertices."""
 
 _SEPARATE = 1.5
-"""Smoothing length of what the lattice sites add to the heights, in blocks."""
+"""Smoothing length of the change of the heights by the lattice sites, in blocks."""
 
 _MARGINS = (0.1, 0.1, 0.06, 0.04, 0.03, 0.02)
 """Softness of the separation in each round, in blocks."""
 
 _BLURRED = 2.0
-"""Half thickness, in blocks, up to which the heights of the hull are not used at all.
+"""Half thickness, in blocks, up to which the heights of the hull are not used.
 
-From one block more they are used in full.
+From one block more on they have full weight.
 """
 
 _THINNEST = 0.25
@@ -84,10 +85,10 @@ class Horizons:
         return bottom, np.maximum(top, bottom + 0.3)
 
     def crossings(self, U: Floats, slip: Floats, limit: float) -> tuple[Floats, Floats]:
-        """Return where normals of the mid surface at U (n, 2) meet bottom and top, (n,) each.
+        """Return the heights at which normals at U (n, 2) meet bottom and top, (n,) each.
 
-        ``slip`` (n, 2): slip per height there; solves t = height(U - t slip) by Newton's
-        method.  Past the blocks, where heights are continued, t stays within the limit.
+        ``slip`` (n, 2) is the slip per height there.  Newton's method solves t = height(U - t
+        slip).  The heights are continued past the blocks, so t is clipped to the limit.
         """
         found = []
         for C in (self.bottom, self.top):
@@ -101,7 +102,7 @@ class Horizons:
 
 
 def fit_horizons(fitted: FittedSheet, samples: HullSamples, knots: float) -> Horizons:
-    """Return the height fields of top and bottom fitted to the hull (see Horizons)."""
+    """Return the height fields of top and bottom fitted to the hull."""
     sheet, grid = fitted.sheet, fitted.sheet.grid
     foot = sheet.search().feet(samples.points)
     cos = np.einsum("ij,ij->i", samples.normals, foot.normal)
@@ -137,15 +138,15 @@ def separate_horizons(
 ) -> Horizons:
     """Return the height fields of top and bottom that separate blocks from empty sites.
 
-    Each leaves its start as far as the sites on its own side ask for: the energy is that of
-    `sharpen`, with the second differences of what is added.
+    The energy is that of `sharpen`, for the sites on each horizon's own side, plus the second
+    differences of the change.
 
     Parameters
     ----------
     fitted : FittedSheet
         Sharpened by the sites.
     hull : Horizons
-        Fitted to the hull: the start, unless the sheet is thin.
+        Heights fitted to the hull; the start, unless the sheet is thin.
     sites : Sites
         Lattice sites at the body's surface.
     rules : SiteRules

@@ -22,23 +22,22 @@ from geounfold.methods.sheet.mid_surface.surface import (
 )
 
 OWN = 0.75
-"""How far past the half thickness a foot is taken to be on the point's own limb, in blocks."""
+"""Distance past the half thickness, in blocks, up to which a foot is on the point's own limb."""
 
 RIDGE = 1e-9
-"""Weight that holds coefficients which nothing else reaches."""
-
+"""Weight on the diagonal, for coefficients that no sample reaches."""
 
 KNOTS = 3.5
 """Spacing of the spline's knots, in blocks."""
 
 SMOOTH = 2.2
-"""Length in blocks below which the mid surface is smoothed on smooth hulls."""
+"""Length, in blocks, below which the mid surface is smoothed on smooth hulls."""
 
-_CELL = 1.5  # spacing of the sampling that feet are searched in, blocks
-_REACH = 4.0  # distance past the accepted hull vertices within which feet are searched, blocks
-_QUIET, _LOUD = 0.03, 0.08  # residuals in blocks: smooth hulls below, staircases above
+_CELL = 1.5  # blocks: spacing of the sampling in which feet are searched
+_REACH = 4.0  # blocks: distance past the accepted hull vertices within which feet are searched
+_QUIET, _LOUD = 0.03, 0.08  # blocks: residual of smooth hulls at most, of staircases at least
 _WEAK = 1e-4  # weight of medial points off the core
-_FIRST = 1.5  # departure from the half thickness that is accepted in round one, blocks
+_FIRST = 1.5  # blocks: largest departure from the half thickness accepted in round one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,18 +56,18 @@ class FitSettings:
         Order of the differences of the half thickness that are kept small: 2, or 3 if it may
         taper all the way.
     unseen : float
-        Weight of curvature, which decides across a narrow strip that no hull vertex reaches.
+        Weight of curvature beside its slope; it keeps the surface plane far from hull vertices.
     rounds : int
         Rounds of growth.
     agree : float
         Least cosine between the normal of an accepted hull vertex and the predicted normal.
     later : float
-        Departure from the half thickness that is accepted after round one.
+        Largest departure from the half thickness accepted after round one.
     erosion : float
         Distance kept from rejected hull vertices.
     ahead : float
-        Hull vertices whose feet lie farther than this from the accepted ones of the round before
-        are left for later rounds.
+        Distance from the feet accepted in the round before; hull vertices with feet farther away
+        wait for later rounds.
     """
 
     smooth: float = SMOOTH
@@ -85,18 +84,18 @@ class FitSettings:
 
 @dataclass(frozen=True, eq=False)
 class HullSamples:
-    """Points of the hull with outward normals, and how the hull was made.
+    """Points of the hull with outward normals, and the bias of the hull.
 
     Attributes
     ----------
     points, normals : (n, 3) float
         Hull vertices, working units, and their unit outward normals.
     side : (n,) int
-        The split's side of each: +1 top, -1 bottom, 0 undecided.
+        Side by the split: +1 top, -1 bottom, 0 undecided.
     variance : (3,) float
         Variance of the blur per axis.
     inset : float
-        How far inside the body's surface the hull runs.
+        Depth of the hull below the body's surface.
     """
 
     points: Floats
@@ -112,7 +111,7 @@ class FittedSheet:
 
     Attributes
     ----------
-    sheet : Sheet
+    sheet : MidSurface
         Mid surface; offsets are positive on the top's side.
     half : (size,) float
         Spline coefficients of the half thickness, in *unfolded* parameters.
@@ -127,10 +126,10 @@ class FittedSheet:
     accepted : float
         Share of the samples accepted.
     lean, level : float
-        Where the sheet was moved onto the surface that layers run parallel to (see conform):
-        side and median half thickness.
+        Side (1 top, -1 bottom, 0 none) and median half thickness, if the sheet was moved onto the
+        surface that layers run parallel to (`parallel_surface.conform`).
     unit : float
-        Side of what it was fitted to, blocks or cells of merged blocks, in the unit of lengths.
+        Side of the blocks or merged cells that it was fitted to, in the unit of lengths.
     """
 
     sheet: MidSurface
@@ -160,11 +159,10 @@ class FittedSheet:
     def own_feet(self, Q: Floats, reaches: tuple[float, ...]) -> Foot:
         """Return the feet of points Q (n, 3) of the body on the limb that they belong to.
 
-        Where limbs come close, the nearest point of the sheet may lie where it was continued
-        past its rim into another limb.  So the least continued part of it that has a foot
-        within the half thickness is taken: parts within ``reaches`` (rising) of the samples
-        are tried in turn.  What none of them holds has the foot of the last one, or of the
-        whole sheet.
+        The sheet is continued past its rim, and if limbs are close the continuation may run into
+        another limb, so that the nearest foot is wrong.  So parts of the sheet within ``reaches``
+        (increasing) of the samples are searched in turn, until a foot lies within the half
+        thickness.  If none does, the foot on the last part, or on the whole sheet, is returned.
         """
         foot = self.sheet.search(self.near, reaches[0]).feet(Q)
         for reach in (*reaches[1:], None):
@@ -183,10 +181,10 @@ class FittedSheet:
         return foot
 
     def left_out(self, points: Floats) -> float:
-        """Return how far the points (n, 3) of the body lie beyond its horizons, on average.
+        """Return the mean distance by which points (n, 3) of the body lie beyond the horizons.
 
-        At most three blocks each, which also stand for a point without a foot.  About 0.001
-        blocks where the sheet holds the body, 0.1 and more where it lost a limb.
+        The distance is cut at three blocks, which is also the value of a point without a foot.
+        Measured: about 0.001 blocks if the sheet holds the body, 0.1 and more if it lost a limb.
         """
         foot = self.own_feet(points, tuple(r * self.unit for r in (2.0, 5.0, 10.0)))
         grid, most = self.sheet.grid, 3.0 * self.unit
@@ -201,7 +199,7 @@ class FittedSheet:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """The grid's energies and weights that every solve of the fit shares."""
+    """Energies and weights of the grid, shared by every solve of the fit."""
 
     grid: SplineGrid
     bending: Stencils
@@ -210,7 +208,11 @@ class _System:
     unseen: float
 
     def stiffness(self, length: float) -> Stencils:
-        """Return the surface's energy: curvature continues, and is none where nothing says so."""
+        """Return the smoothing matrix of the surface.
+
+        It penalises third differences, so curvature is carried past the samples; a weak second term
+        makes the surface plane where there are none.
+        """
         return (length / self.grid.step) ** 6 * self.third + self.unseen * self.bending
 
 
@@ -225,7 +227,7 @@ def _start(
     even_half = (settings.smooth_half / KNOTS) ** (2 * settings.order_half) * (
         grid.energy(settings.order_half)
     )
-    if settings.order_half > 2:  # steady slopes are free then, and unlimited past the samples
+    if settings.order_half > 2:  # else constant slopes cost nothing and continue past the samples
         even_half = even_half + settings.unseen * bending
     system = _System(grid, bending, grid.energy(3), even_half, settings.unseen)
     w = density_weights(medial.uv, KNOTS) * np.where(medial.trusted, 1.0, _WEAK)
@@ -265,10 +267,11 @@ def _accept(
     near: Floats,
     settings: FitSettings,
 ) -> _Accepted:
-    """Return which samples agree with the sheet so far, by normal and by thickness.
+    """Return which samples agree with the sheet of the round before, by normal and by thickness.
 
-    Those far from the parameters ``near`` (k, 2) say nothing yet, for or against.
-    The distance kept from those that do not is reduced where it would cost most of a strip.
+    Samples farther than ``settings.ahead`` from the parameters ``near`` (k, 2) are neither accepted
+    nor rejected.  The distance kept from rejected samples is reduced if it would drop more than
+    half of the accepted ones.
     """
     side = np.sign(np.einsum("ij,ij->i", samples.normals, foot.normal))
     height = unbiased_heights(sheet, foot, side, samples)
@@ -278,7 +281,7 @@ def _accept(
     predicted = unit(side[:, None] * foot.normal - hu[:, None] * Pu - hv[:, None] * Pv)
     cos = np.einsum("ij,ij->i", samples.normals, predicted)
     good = (cos > settings.agree) & (side != 0) & (np.abs(side * height - expected) < misfit)
-    good &= side * samples.side >= 0  # else the sheet has run into another limb
+    good &= side * samples.side >= 0  # otherwise the sheet has run into another limb
     true_foot = foot.miss < 0.1
     if np.isfinite(settings.ahead):
         true_foot &= cKDTree(near).query(foot.U)[0] < settings.ahead
@@ -307,8 +310,8 @@ def _refit(
 ) -> tuple[MidSurface, Floats, Floats, float, float]:
     """Return sheet, half thickness, weights, roughness and smoothing of one round.
 
-    Offset and half thickness are solved together, t = delta(U) + side half(u); the mid
-    points move by what is left and the surface is fitted to them anew.
+    Offset and half thickness are solved together, t = delta(U) + side half(u).  The mid points are
+    then moved by the residual, and the surface is fitted to them again.
     """
     keep = accepted.keep
     U, t, s = accepted.foot.U[keep], accepted.height[keep], accepted.side[keep]
@@ -340,12 +343,12 @@ def fit_mid_surface(
     ----------
     medial : MedialSheet
         First guess.
-    samples : Samples
+    samples : HullSamples
         The hull's vertices.
     points : (n, 3) float
         The blocks, which set how far the sheet must reach.
     settings : FitSettings
-        How it is fitted.
+        Settings of the fit.
 
     Raises
     ------

@@ -27,10 +27,10 @@ from geounfold.surfaces.split.faces import THICKEST
 from geounfold.surfaces.split.result import SurfaceSplit
 
 CORE = 0.94
-"""Least cosine between a core face's normal and the reversed normal of its opposite face."""
+"""Least cosine between the normal of a face of the core and the reversed normal opposite it."""
 
 _SWEEPS = 6
-"""Bilateral passes that smooth the face normals before they are compared."""
+"""Number of bilateral passes that smooth the face normals before they are compared."""
 
 _CLOSING = 2.5
 """Width of gaps that are closed in the core, in blocks."""
@@ -38,11 +38,11 @@ _CLOSING = 2.5
 _ISLAND = 0.05
 """Least share of the core's largest part that another part must have to be kept.
 
-The tip of an oblique cut is parallel to the other side again by chance.
+The tip of an oblique cut may be parallel to the other side by chance.
 """
 
 _EROSION = 1.5
-"""Distance of the core from the rim, in blocks; halved, then dropped, if little would be left."""
+"""Distance of the core from the rim, in blocks; halved, then set to 0, if little would be left."""
 
 _DEEP = 1.2
 """Distance from the change of side, in median thicknesses, beyond which a face is kept."""
@@ -51,7 +51,7 @@ _FAIR = 0.5
 """Least share of a side's area that is laid flat before the distance from the rim is reduced."""
 
 _MORE_COMPLETE = 0.2
-"""Share of its area by which the bottom must be more complete to be flattened for the top."""
+"""Share of its area by which the bottom must be more complete to replace the top."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class MedialSheet:
     Attributes
     ----------
     mesh : TriMesh
-        Medial points, (n, 3), joined as the top's faces are.
+        Medial points, (n, 3), with the faces of the top.
     uv : (n, 2) float
         Isometric parameters, turned towards the working axes.
     half : (n,) float
@@ -69,7 +69,7 @@ class MedialSheet:
     trusted : (n,) bool
         True on the core, where the half thickness was measured.
     core_faces : (m,) bool
-        For every hull face: in the core.
+        Whether each face of the hull is in the core.
     normals : (k, 3) float
         Smoothed outward normals of the hull's vertices.
     """
@@ -88,10 +88,10 @@ class MedialSheet:
 
 
 def _check_open(mesh: TriMesh) -> None:
-    """Raise NoSheetError where a surface closes on itself, as a tube does.
+    """Raise NoSheetError if a surface closes on itself like a tube.
 
-    A pierced sheet has several boundary loops too, but its outer one turns by about 2 pi; of a
-    surface closed around an axis every loop runs around it and turns by about nothing.
+    A pierced sheet has several boundary loops too, but its outer loop turns by about 2 pi.  If a
+    surface is closed around an axis, every loop runs around the axis and turns by about 0.
     """
     loops = boundary_loops(mesh.F)
     if len(loops) == 1:
@@ -107,7 +107,7 @@ def _check_open(mesh: TriMesh) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Domain:
-    """Faces of one side, ``top`` or not, that are laid flat; ``share`` of the side's area."""
+    """Faces of one side (the top if ``top``) to lay flat; their ``share`` of the side's area."""
 
     faces: Ints
     top: bool
@@ -117,10 +117,10 @@ class _Domain:
 def _regions(
     split: SurfaceSplit, normals: Floats, centres: Floats, least: float
 ) -> tuple[Bools, Ints, bool]:
-    """Return the trusted core (m,), the faces that are laid flat, and whether they are the top's.
+    """Return the trusted core (m,), the faces to lay flat, and whether they are the top's.
 
-    A strip has little left away from its rim: the distance kept from it is reduced until the
-    faces are a fair share of their side.
+    Most of a narrow strip lies near its rim.  So the distance from the rim is reduced until the
+    faces are at least the share `_FAIR` of their side.
     """
     area = triangle_areas(split.mesh.V, split.mesh.F)
     deep = _far_inside(split, centres)
@@ -165,7 +165,7 @@ def _large_parts(faces: Bools, adjacency: Ints) -> Bools:
 def _harmonic_half(
     split: SurfaceSplit, F: Ints, faces: Ints, core: Bools, n: int
 ) -> tuple[Floats, Bools]:
-    """Return half the thickness per vertex, measured on the core, harmonic elsewhere."""
+    """Return the half thickness per vertex: measured on the core, harmonic elsewhere."""
     good = core[faces] & np.isfinite(split.thickness[faces])
     value = np.where(good, split.thickness[faces] / 2, 0.0)
     count = vertex_sum(good.astype(float), F, n)
@@ -186,14 +186,14 @@ def medial_sheet(
     flatten: Callable[[TriMesh, Floats | None], Floats],
     core: float = CORE,
 ) -> MedialSheet:
-    """Return medial points of a split hull, half a thickness below the top, and parameters.
+    """Return the medial points of a split hull, half a thickness below the top, and parameters.
 
     Parameters
     ----------
     split : SurfaceSplit
         Hull in working units.
     flatten : callable
-        ``flatten(mesh, start)`` -> uv (n, 2), an isometric flattening; start may be None.
+        ``flatten(mesh, start)`` returns an isometric flattening, (n, 2); start may be None.
     core : float
         Least cosine between a core face's normal and the reversed normal of its opposite face.
 
@@ -221,10 +221,10 @@ def medial_sheet(
 
 
 def _domain(split: SurfaceSplit, inside: Bools, area: Floats) -> _Domain | None:
-    """Return the faces inside that are laid flat; None where there are none.
+    """Return the faces inside that are laid flat; None if there are none.
 
-    The top's, unless its largest part leaves out more of it than the bottom's does by some
-    share: at the inside of a tight hinge there is little to see of a side.
+    The top's, unless the largest part of the bottom is more complete by `_MORE_COMPLETE`: on the
+    inside of a tight hinge a side may be almost hidden.
     """
     found = []
     for side in (1, -1):
@@ -241,7 +241,7 @@ def _domain(split: SurfaceSplit, inside: Bools, area: Floats) -> _Domain | None:
 def _one_sheet(F: Ints, faces: Ints) -> Ints:
     """Return the largest part of some faces that is a manifold surface.
 
-    Faces around a vertex where two fans meet are left out.
+    Faces around a vertex at which two fans meet are left out.
     """
     while len(faces):
         component = face_components(F[faces])
@@ -254,9 +254,10 @@ def _one_sheet(F: Ints, faces: Ints) -> Ints:
 
 
 def _far_inside(split: SurfaceSplit, centres: Floats) -> Bools:
-    """Return the faces farther than some median thicknesses from the change of side.
+    """Return the faces farther than `_DEEP` median thicknesses from the change of side.
 
-    Not those whose ray missed the other side: ends of limbs that meet look along them.
+    Faces whose ray missed the other side are excluded: at the ends of limbs that meet, normals
+    point along the limbs.
     """
     near = np.where(split.adjacency >= 0, split.adjacency, np.arange(len(centres))[:, None])
     change = (split.side[near] != split.side[:, None]).any(axis=1)
@@ -270,9 +271,9 @@ def _far_inside(split: SurfaceSplit, centres: Floats) -> Bools:
 def _oriented(uv: Floats, V: Floats) -> Floats:
     """Return parameters centred and turned, never mirrored, towards the working axes.
 
-    Of the isometry of the plane nearest to the map uv -> V, the first working axis (the
-    body's longest) has no component along the second parameter, and a positive one along the
-    first: flat x runs where the folded body's first axis does.
+    Flat x points along the folded body's first (longest) axis: in the isometry of the plane nearest
+    to the map uv -> V, that axis has a positive component along the first parameter and none along
+    the second.
     """
     centred = uv - uv.mean(axis=0)
     left, _, right = np.linalg.svd((V - V.mean(axis=0)).T @ centred, full_matrices=False)

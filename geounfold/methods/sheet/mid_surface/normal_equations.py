@@ -1,8 +1,8 @@
-"""Normal equations of spline fits: symmetric matrices by stencils, solved in bands.
+"""Normal equations of spline fits: symmetric matrices stored by stencils, with banded solvers.
 
-Every matrix of a fit couples a coefficient of the grid with those a few places away, so it is kept
-as one array per offset; assembly, sums and the banded factorisation are then dense and linear in
-the number of points.
+Every matrix of a fit couples a coefficient of the grid with those a few places away, so it is
+stored as one array per offset.  Assembly, sums and the banded factorisation are then dense, and
+linear in the number of points.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from geounfold.geometry.mesh import Floats, Ints
 
 Solve = Callable[[Floats], Floats]
 
-_LARGEST_BAND = 60_000_000  # entries: half a gigabyte; beyond it, a sparse factorisation
-_SLAB = 32  # points of one cell that are multiplied at once
-_CHUNK = 16384  # points assembled at once: their products stay in the cache
+_LARGEST_BAND = 60_000_000  # entries (half a gigabyte); a larger matrix is factored as sparse
+_SLAB = 32  # points of one cell multiplied at once
+_CHUNK = 16384  # points assembled at once, so that products stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +36,8 @@ class Stencils:
     shape : (int, int)
         Number of coefficients along each axis.
     values : mapping of (du, dv) to (size,) float
-        For offsets with du > 0, or du = 0 and dv >= 0: the entry between the coefficient at
-        (i, j) and that at (i + du, j + dv), zero where the latter is off the grid.
+        For offsets with du > 0, or du = 0 and dv >= 0: the entry between the coefficients at (i, j)
+        and (i + du, j + dv), zero if the latter is off the grid.
     """
 
     shape: tuple[int, int]
@@ -74,7 +74,7 @@ class Stencils:
             yield du * self.shape[1] + dv, value
 
     def between(self, nodes: Floats) -> Stencils:
-        """Return an energy of surfaces as one of displacements along nodes' normals (size, 3)."""
+        """Return an energy of surfaces as one of displacements along the normals (size, 3)."""
         x = np.ascontiguousarray(nodes.T)
         out = {}
         for (du, dv), value in self.values.items():
@@ -109,7 +109,7 @@ class Stencils:
 
 
 def banded_solver(band: Floats) -> Solve:
-    """Factor a symmetric positive definite matrix given by its lower band; it is overwritten.
+    """Factor a symmetric positive definite matrix given by its lower band, which is overwritten.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def graph_laplacian(F: Ints, n: int) -> sp.csr_array:
 def coupled_solver(first: Stencils, second: Stencils, cross: sp.csr_array, ridge: float) -> Solve:
     """Factor ``[[first, cross], [cross.T, second]]`` plus a ridge, for vectors (2 size,).
 
-    The two fields' coefficients alternate, so that the matrix is banded.
+    Coefficients of the two fields alternate, so that the matrix is banded.
     """
     n = first.size
     entries = cross.tocoo()
@@ -208,7 +208,7 @@ def _squared(n: int, order: int) -> Floats:
 def gram(B: sp.csr_array, w: Floats, shape: tuple[int, int]) -> Stencils:
     """Return ``B.T @ diag(w) @ B`` of basis rows (SplineGrid.basis), w (n,) not negative.
 
-    Points are grouped by cell, where all rows have the same 16 columns.
+    Points are grouped by cell: all rows of a cell have the same 16 columns.
     """
     rows, first = B.data.reshape(-1, 16), B.indices[::16].astype(np.int64)
     order = np.argsort(first, kind="stable")

@@ -1,8 +1,8 @@
 """Which surface the layers run parallel to: the mid surface, the top or the bottom.
 
-Where thickness varies on both sides alike, layers follow the mid surface.  Where it varies on
-one side only, a bulge or a scour, they follow the other side.  Of the three surfaces the layers'
-own was flat once, and flattens with the least strain.
+If the thickness varies alike on both sides, layers follow the mid surface.  If it varies on one
+side only (a bulge or a scour), they follow the other side.  The surface that layers follow was flat
+before folding, so it is the one of the three that flattens with the least strain.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from geounfold.methods.sheet.mid_surface.spline import density_weights
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, normals, slip_potential
 
 _VARIED = 0.03
-"""Relative standard deviation of the half thickness below which the mid surface stays."""
+"""Relative standard deviation of the half thickness below which the mid surface is kept."""
 
 _STRAINED = 0.002
-"""Strain (rms over edges) of the flattened mid surface below which it stays."""
+"""Strain (rms over edges) of the flattened mid surface below which it is kept."""
 
 _CLEARLY_LESS = 0.5
 """Share of the mid surface's strain that the top or the bottom must stay below to be taken."""
@@ -39,16 +39,16 @@ def conform(
     Parameters
     ----------
     fitted : FittedSheet
-        With the mid surface as its sheet.
+        Fit with the mid surface as its sheet.
     medial : MedialSheet
-        Gives the domain that is flattened.
+        Medial points; they define the domain that is flattened.
     flatten : callable
-        ``flatten(mesh, start)`` -> uv (n, 2).
+        ``flatten(mesh, start)`` returns a flattening, (n, 2).
 
     Returns
     -------
     FittedSheet
-        ``lean`` is 0 where the mid surface stays, 1 for the top's shape, -1 for the bottom's.
+        ``lean`` is 0 if the mid surface was kept, 1 for the top's shape, -1 for the bottom's.
     """
     half = fitted.sheet.grid.value(fitted.half, fitted.near)
     level = float(np.median(half))
@@ -74,7 +74,7 @@ def conform(
 def _leaning(
     fitted: FittedSheet, U: Floats, lean: float, level: float, limits: tuple[float, float]
 ) -> Floats:
-    """Return points of the sheet moved towards a side by what it is thicker there, (n, 3)."""
+    """Return points of the sheet moved towards a side by their extra half thickness, (n, 3)."""
     jet = fitted.sheet.jet(U)
     half = np.clip(fitted.sheet.grid.value(fitted.half, U), *limits)
     return jet.value + (lean * (half - level))[:, None] * normals(jet)
@@ -83,7 +83,7 @@ def _leaning(
 def _moved(
     fitted: FittedSheet, lean: float, level: float, limits: tuple[float, float]
 ) -> FittedSheet:
-    """Return the fit with its sheet moved, and its slip anew."""
+    """Return the fit with its sheet moved and its slip recomputed."""
     sheet, grid = fitted.sheet, fitted.sheet.grid
     U, _ = sheet.samples()
     B = grid.basis(U)

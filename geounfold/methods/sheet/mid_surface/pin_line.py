@@ -1,8 +1,9 @@
-"""Where layers do not slip: the pin line, free in flexural slip, put at the mean of the profile.
+"""The pin line, where layers do not slip.
 
-The mean is taken over the section across the fold axis, in which every station counts once however
-wide, thick or pierced the sheet is there.  So neither a hole nor an embayment nor a rim that
-tapers moves the pin line.
+Flexural slip leaves its position open; it is placed where the mean slip over the cross-section is
+zero.  The cross-section runs across the fold axis.  Every station along it counts once, however
+wide, thick or pierced the sheet is there, so holes, embayments and tapering rims do not move the
+pin line.
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from geounfold.methods.sheet.mid_surface.normal_equations import spd_solver
 from geounfold.methods.sheet.mid_surface.surface import MidSurface, normals, second_form
 
 _SMOOTH = 10.0
-"""Weight of second differences between strips, beside that of a usual strip's own mean.
+"""Weight of second differences between strips, relative to that of a full strip's mean.
 
-Half-wave lengths of 10 strips keep 0.91 of their size, those of 20 0.994.
+A wave with a half wavelength of 10 strips keeps 0.91 of its amplitude, one of 20 strips 0.994.
 """
 
 
 def fold_axes(sheet: MidSurface, U: Floats) -> Floats:
     """Return unit directions across the fold axis and along it, as rows (2, 2).
 
-    The first is that of the largest squared curvature, summed over U (n, 2): the first axis of
-    the second form squared, to which crests and troughs count alike.
+    The first is the direction of the largest squared curvature, summed over U (n, 2): the first
+    eigenvector of the summed square of the second form.  Crests and troughs count alike.
     """
     jet = sheet.jet(U)
     L, M, N = second_form(jet, normals(jet))
@@ -37,12 +38,12 @@ def fold_axes(sheet: MidSurface, U: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """The section of a sheet across its fold axis, and that along it.
+    """The sections of a sheet across its fold axis and along it.
 
     Attributes
     ----------
     axes : (2, 2) float
-        Their directions in the plane of the parameters: unit rows at right angles.
+        Directions of both in the plane of the parameters, as orthonormal rows.
     span : (2, 2) float
         Lowest and highest station (rows) along each axis.
     """
@@ -51,21 +52,21 @@ class CrossSection:
     span: Floats
 
     def mean(self, values: Floats, U: Floats, weight: Floats, cell: float) -> Floats:
-        """Return the mean of vectors over the sheet, (2,), in which every station counts once.
+        """Return the mean of vectors over the sheet, (2,); every station counts once.
 
-        The component along each axis is averaged within strips across that axis, and then over
-        the strips by how much of the span each covers.
+        The component along each axis is averaged within strips across that axis, then over the
+        strips, weighted by the length of the span that each covers.
 
         Parameters
         ----------
         values : (n, 2) float
             Vectors in the plane of U.
         U : (n, 2) float
-            Their places.
+            Places of the vectors.
         weight : (n,) float
-            Of each within its strip; not negative.
+            Weight of each vector within its strip; not negative.
         cell : float
-            Width of the strips, whose middles are whole widths from the first place.
+            Width of the strips.  Their middles are a whole number of widths from the first place.
         """
         along, places = values @ self.axes.T, U @ self.axes.T
         low, high = self.span
@@ -83,10 +84,10 @@ class CrossSection:
 
 
 def _smoothed(sums: Floats, total: Floats) -> Floats:
-    """Return the strips' means (s,), continued over strips that have little weight or none.
+    """Return the means of the strips (s,), continued over strips of little or no weight.
 
-    By least second differences (Whittaker smoothing), each mean weighed by its strip's share of
-    the usual weight, at most one.
+    Whittaker smoothing (least second differences).  Each mean has the weight of its strip relative
+    to a full strip's, at most 1.
     """
     n, usual = len(total), float(np.median(total[total > 0]))
     means = sums / np.where(total > 0, total, 1.0)

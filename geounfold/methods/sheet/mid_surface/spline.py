@@ -12,10 +12,10 @@ import scipy.sparse as sp
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.methods.sheet.mid_surface.normal_equations import Stencils, energy, gram
 
-_CHUNK = 4096  # points evaluated at once: their coefficients stay in the cache
+_CHUNK = 4096  # points evaluated at once, so that coefficients stay in the cache
 
 _POWERS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
-"""Coefficients of 1, f, f^2, f^3 in a cell from its four B-spline coefficients."""
+"""Matrix from a cell's four B-spline coefficients to the coefficients of 1, f, f^2, f^3."""
 
 
 class Jet(NamedTuple):
@@ -68,7 +68,7 @@ def _horner(c: Floats, f: Floats, order: int) -> list[Floats]:
 
 
 def _cubics(grid: Floats, axis: int) -> Floats:
-    """Return the cubics in the cells along an axis of B-spline coefficients, powers first."""
+    """Return the cubics of all cells along an axis of B-spline coefficients, powers first."""
     n = grid.shape[axis] - 3
     windows = [grid.take(np.arange(q, q + n), axis=axis) for q in range(4)]
     return np.stack([sum(m * w for m, w in zip(row, windows, strict=True)) for row in _POWERS])
@@ -167,7 +167,7 @@ class SplineGrid:
         return [a[0] for a in out] if C.ndim == 1 else [a.T for a in out]
 
     def _bicubics(self, C: Floats) -> Floats:
-        """Return every cell's bicubics of coefficients C (size, d), (4, 4, d, cells).
+        """Return the bicubics of all cells for coefficients C (size, d), (4, 4, d, cells).
 
         The first index is the power of the cell's fraction along v, the second along u.
         """

@@ -16,11 +16,11 @@ from geounfold.methods.sheet.mid_surface.spline import Jet, SplineGrid
 
 
 class Foot(NamedTuple):
-    """Closest points of a mid surface.
+    """Feet of points: the closest points of a mid surface.
 
-    ``U`` (n, 2) parameters, ``t`` (n,) signed normal offset (positive on the top's side),
-    ``normal`` (n, 3) the surface's unit normal there, ``miss`` (n,) distance between the
-    point and ``P(U) + t normal``, which is zero for a true foot.
+    ``U`` (n, 2): parameters; ``t`` (n,): signed offset along the normal, positive on the top's
+    side; ``normal`` (n, 3): unit normal of the surface there; ``miss`` (n,): distance between the
+    point and ``P(U) + t normal``, zero for a true foot.
     """
 
     U: Floats
@@ -44,7 +44,7 @@ def second_form(jet: Jet, normal: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def principal_curvatures(jet: Jet) -> tuple[Floats, Floats]:
-    """Return the principal curvatures (k1 >= k2), positive where the top side is concave."""
+    """Return the principal curvatures (k1 >= k2), positive if the top side is concave."""
     L, M, N = second_form(jet, normals(jet))
     E, F, G = (
         np.einsum("ij,ij->i", a, b) for a, b in ((jet.u, jet.u), (jet.u, jet.v), (jet.v, jet.v))
@@ -79,7 +79,7 @@ class MidSurface:
     cell: float = 1.5
 
     def with_coefficients(self, C: Floats) -> MidSurface:
-        """Return the sheet of other coefficients over the same parameters."""
+        """Return the sheet with other coefficients over the same parameters."""
         return replace(self, C=C)
 
     def scaled(self, factor: float) -> MidSurface:
@@ -123,7 +123,7 @@ class MidSurface:
 
 @dataclass(frozen=True, eq=False)
 class FootSearch:
-    """A search structure over part of a sheet; see Sheet.search."""
+    """A search structure over part of a sheet (`MidSurface.search`)."""
 
     sheet: MidSurface
     U: Floats
@@ -135,7 +135,7 @@ class FootSearch:
         _, face, closest = self.index.closest(Q)
         corners = self.F[face]
         weights = barycentric_in_triangles(closest, self.index.V, corners)
-        weights = np.where(np.isfinite(weights), weights, 1 / 3)  # where a triangle has no area
+        weights = np.where(np.isfinite(weights), weights, 1 / 3)  # triangles without area
         U = np.einsum("ij,ijk->ik", weights, self.U[corners])
         for _ in range(newton):
             U = U + newton_step(self.sheet, Q, self.sheet.jet(U))
@@ -149,8 +149,8 @@ class FootSearch:
 def newton_step(sheet: MidSurface, Q: Floats, jet: Jet) -> Floats:
     """Return the step (n, 2) in the parameters towards the feet of points Q (n, 3).
 
-    The Newton matrix is the first form less t times the second, the exact Hessian of half
-    the squared distance but for third derivatives; steps are clipped to one knot.
+    The Newton matrix is the first form minus t times the second: the Hessian of half the squared
+    distance without third derivatives.  Steps are clipped to one knot.
     """
     normal = normals(jet)
     r = Q - jet.value
@@ -161,7 +161,7 @@ def newton_step(sheet: MidSurface, Q: Floats, jet: Jet) -> Floats:
     G = np.einsum("ij,ij->i", jet.v, jet.v) - t * N
     bu, bv = np.einsum("ij,ij->i", r, jet.u), np.einsum("ij,ij->i", r, jet.v)
     det = E * G - F * F
-    good = det > 0.05  # past the focal surface the step would leave the foot
+    good = det > 0.05  # past the focal surface a step would lead away from the foot
     safe = np.where(good, det, 1.0)
     step = np.stack([G * bu - F * bv, E * bv - F * bu], axis=1) / safe[:, None]
     limit = sheet.grid.step
@@ -169,11 +169,11 @@ def newton_step(sheet: MidSurface, Q: Floats, jet: Jet) -> Floats:
 
 
 def blur_shift(jet: Jet, t: Floats, variance: Floats) -> Floats:
-    """Return how far a Gaussian blur moved the level surface at offset t, towards +normal.
+    """Return the shift, along +normal, of the level surface at offset t by a Gaussian blur.
 
-    A blurred indicator's half level shifts to the concave side by half the variance times
-    the sum of the curvatures of the parallel surface, k / (1 - t k); ``variance`` (3,) is
-    per working axis, its share along each principal direction is used.
+    The half level of a blurred indicator moves to the concave side by half the variance times the
+    sum of the curvatures of the parallel surface, k / (1 - t k).  ``variance`` (3,) is given per
+    working axis; its component along each principal direction is used.
     """
     normal = normals(jet)
     L, M, N = second_form(jet, normal)
@@ -193,11 +193,11 @@ def blur_shift(jet: Jet, t: Floats, variance: Floats) -> Floats:
 
 
 def slip_potential(sheet: MidSurface, U: Floats, weights: Floats, bending: Stencils) -> Floats:
-    """Return coefficients (size, 2) of phi with grad phi = second form (flexural slip).
+    """Return coefficients (size, 2) of the slip potential phi: grad phi = second form.
 
-    Before folding, the point at offset t over U lay at u = U - t phi(U); the free constant
-    is the pin line: zero weighted mean over the samples U (n, 2).  ``bending`` is the
-    grid's second-order energy, a light regularisation where there are no samples.
+    In flexural slip, the point at offset t over U lay at u = U - t phi(U) before folding.  The free
+    constant is the pin line; it is set so that the weighted mean over the samples U (n, 2) is zero.
+    ``bending`` is the grid's second-order energy, a weak regularisation away from samples.
     """
     grid = sheet.grid
     jet = sheet.jet(U)

@@ -1,10 +1,11 @@
-"""Sharpen a fitted sheet by what each lattice site says: the surface is above me, or below me.
+"""Sharpen a fitted sheet so that top and bottom separate blocks from empty lattice sites.
 
-A blurred hull averages a staircase; where a horizon runs nearly along a lattice plane the average
-errs by a fixed part of a block.  The sites themselves are exact: a block's centroid lies inside
-the body, its empty neighbour's outside.  So top and bottom are the smoothest pair of surfaces
-that separate the two, found as in logistic classification with a margin that shrinks from 0.3
-block to 0.02.  In a sheet of one or two blocks a block is near both surfaces, and speaks for both.
+A blurred hull averages a staircase.  If a horizon runs nearly along a lattice plane, the average is
+off by a fixed part of a block.  The sites are exact: a block's centroid lies inside the body, its
+empty neighbour's outside.  So top and bottom become the smoothest pair of surfaces that separate
+the two kinds of sites.  They are found by logistic classification with a margin that shrinks from
+0.3 block to 0.02.  In a sheet of one or two blocks a block is near both surfaces, and is used for
+both.
 """
 
 from __future__ import annotations
@@ -26,34 +27,32 @@ from geounfold.methods.sheet.sharpening.lattice_sites import Sites, scatter
 from geounfold.methods.sheet.sharpening.site_places import Places
 from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, RIM, SiteRules
 
-_HOPELESS = 0.03  # blocks: mean depth on the wrong side that cells of merged blocks never mend
-
+_HOPELESS = 0.03  # blocks: mean depth on the wrong side from which merged blocks never recovered
 
 _SMOOTH, _LEAST, _PACE = 2.7, 1.73, 1.15
-"""Smoothing length of the mid surface in blocks: at first, at least, and the factor between.
+"""Smoothing length of the mid surface, in blocks: the first, the least, and the factor.
 
-It is divided by the factor in every round that leaves too many sites on the wrong side.
+The length is divided by the factor after every round with too many sites on the wrong side.
 """
 
-_TOLERATED = 0.03  # share of the sites on the wrong side that is not too many
-_ADAPT = 0.06  # margin, in blocks, from which on they are counted
-_SMOOTH_HALF = 3.5  # smoothing length of the half thickness, blocks
+_TOLERATED = 0.03  # largest share of the sites on the wrong side that is not too many
+_ADAPT = 0.06  # blocks: margin up to which these sites are counted
+_SMOOTH_HALF = 3.5  # blocks: smoothing length of the half thickness
 
 _ENOUGH = 100
-"""Sites per coefficient of the sheet up to which all are used if blocks were merged."""
+"""Sites per coefficient of the sheet; if blocks were merged and there are more, a part is used."""
 
-_LEAST_SHARE = 0.1  # of the sites far from the rim that is kept
+_LEAST_SHARE = 0.1  # least share of the sites far from the rim that is used
 
-
-_THICK = 1.2  # times the half thickness of a thin sheet, from which it is surely none
+_THICK = 1.2  # factor on the half thickness of a thin layer; a layer thicker than that is not thin
 
 
 @dataclass(frozen=True, eq=False)
 class _Views:
-    """The used sites as seen from the sheet.
+    """The used sites relative to the sheet.
 
-    A site lies ``height - A z - H half`` above its own horizon, z the surface's normal
-    displacement and half the half thickness, both as spline coefficients.
+    A site lies ``height - A z - H half`` above its horizon: z is the surface's displacement along
+    its normals and half the half thickness, both as spline coefficients.
     """
 
     height: Floats
@@ -80,7 +79,7 @@ class Separation:
 
 @dataclass(frozen=True, eq=False)
 class _Energy:
-    """What the separation keeps small besides the sites on the wrong side.
+    """Smoothness terms of the separation.
 
     ``rough``, ``fine``: fourth and third differences of coefficients; ``held``: as in SiteRules.
     """
@@ -92,7 +91,7 @@ class _Energy:
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """What one round made: sheet, half thickness, and how many sites are on the wrong side."""
+    """Result of a round: sheet, half thickness, share and mean depth of sites on the wrong side."""
 
     sheet: MidSurface
     half: Floats
@@ -101,7 +100,7 @@ class _Round:
 
 
 def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
-    """Return the sheet moved until the lattice sites lie on their own sides of its horizons.
+    """Return the sheet moved until the lattice sites lie on the correct sides of its horizons.
 
     Parameters
     ----------
@@ -110,7 +109,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
     sites : Sites
         Lattice sites at the body's surface.
     rules : SiteRules
-        Which sites are used, and how softly they are separated.
+        Rules by which sites are used, and softness of the separation.
     """
     fitted, rules = _for_thin(fitted, rules.for_cells(fitted.unit))
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
@@ -143,10 +142,10 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
 
 
 def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:
-    """Return as many sites as a sheet fitted to cells of merged blocks can learn from.
+    """Return the sites to use for a sheet fitted to cells of merged blocks.
 
-    Those near the rim and where the layer is thin all stay, as they tell each other's kind; of the
-    others an even part.
+    All sites near the rim and in thin parts of the layer are kept, because they are needed to find
+    the rim; of the others an evenly spread part.
     """
     most = _ENOUGH * fitted.sheet.grid.size
     if fitted.unit <= 1 or len(sites.points) <= most:
@@ -165,11 +164,11 @@ def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:
 
 
 def _for_thin(fitted: FittedSheet, rules: SiteRules) -> tuple[FittedSheet, SiteRules]:
-    """Return fit and options so that sites of a thin sheet are listened to everywhere.
+    """Return fit and rules so that the sites of a thin sheet are used everywhere.
 
-    The hull of a thin sheet ends in a wide rim, over which the half thickness was continued;
-    where it came to nothing it is raised to half its median.  A thick sheet's own thin parts,
-    where it pinches out, are left to its rim.
+    The hull of a thin sheet ends in a wide rim, over which the half thickness was continued.  There
+    it is raised to at least half its median.  Parts of a thick sheet that pinch out are not
+    changed; they count as rim.
     """
     least = float(np.median(fitted.sheet.grid.value(fitted.half, fitted.near))) / 2
     rules = replace(rules, thinnest=min(rules.thinnest, least))
@@ -195,9 +194,9 @@ def _step(
 ) -> _Round:
     """Take one Newton step in the surface, then one in the half thickness.
 
-    The energy is ``sum margin log(1 + exp(+-m / margin)) / knots^2`` over the sites, m their
-    height above their horizon (+ for blocks, - for empty sites), plus the fourth differences
-    of the moved surface (weight (smooth / knots)^8) and the third of the half thickness.
+    The energy is ``sum margin log(1 + exp(+-m / margin)) / knots^2`` over the sites, m the height
+    above the site's horizon (+ for blocks, - for empty sites), plus the fourth differences of the
+    moved surface (weight (smooth / knots)^8) and the third differences of the half thickness.
     """
     knots = sheet.grid.step
     margin, smooth = lengths
@@ -229,7 +228,7 @@ def separating_step(
 ) -> Floats:
     """Return a Newton step x for ``m - A x`` that moves no site by more than ten margins.
 
-    ``held``: nor any coefficient, past the rim or not.
+    With ``held`` no coefficient moves by more either, past the rim included.
     """
     slope = (expit(m / margin) - ~occupied) / knots**2
     bend = 0.25 / np.cosh(np.clip(m / (2 * margin), -20, 20)) ** 2

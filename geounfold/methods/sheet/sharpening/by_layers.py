@@ -1,8 +1,8 @@
-"""Sharpen a fitted sheet by the layers that points gridded before folding lie in.
+"""Sharpen a fitted sheet by the layers of points that were gridded before folding.
 
-Such points are no lattice, but in the sheet's coordinates they are: in m layers at heights
-(2 i + 1 - m) / m of the half thickness.  Every point then measures the mid surface, where a
-density hull is drawn outwards or inwards as folding spreads the points or packs them.
+Such points lie on a lattice only in the sheet's coordinates: in m layers at heights (2 i + 1 - m) /
+m of the half thickness.  So every point is a measurement of the mid surface.  A density hull alone
+is biased, because folding spreads points on one side and packs them on the other.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from geounfold.methods.sheet.sharpening.displace import (
 from geounfold.methods.sheet.sharpening.lattice_sites import scatter
 
 CLEAR = 0.5
-"""Mean cosine of the heights' phase from which points count as lying in layers; 1 is exact."""
+"""Mean cosine of the phase of the heights from which points count as layered; 1 is exact."""
 
 MOST = 12_000
-"""Points used at most."""
+"""Largest number of points used."""
 
-_ROUNDS = 4  # fits, with feet found anew before each
-_SMOOTH = (1.0, 1.6, 2.4, 3.2)  # smoothing lengths in blocks, chosen among by cross-validation
-_SMOOTH_HALF = 2.0  # least smoothing length of the half thickness, blocks
+_ROUNDS = 4  # number of fits; feet are searched again before each
+_SMOOTH = (1.0, 1.6, 2.4, 3.2)  # smoothing lengths in blocks; cross-validation chooses one
+_SMOOTH_HALF = 2.0  # blocks: least smoothing length of the half thickness
 
 
 def layer_heights(t: Floats, half: Floats, clear: float = CLEAR) -> Floats | None:
     """Return the height of each point's layer as a share of the half thickness, (n,).
 
-    None where the points are not in layers: for no number m of them is the mean of
-    ``-cos(pi m (t / half + 1))``, 1 for points in mid-layer, above ``clear``.
+    None if the points do not lie in layers: the mean of ``-cos(pi m (t / half + 1))``, which is 1
+    for points in the middle of m layers, is below ``clear`` for every m.
 
     Examples
     --------
@@ -60,9 +60,10 @@ def layer_heights(t: Floats, half: Floats, clear: float = CLEAR) -> Floats | Non
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Heights r that a displacement z and a change of half thickness d should explain.
+    """Least squares of heights r for a displacement z and a change of half thickness d.
 
-    ``r = A z + H d``; H has the layers' shares in it.  With the energies of both.
+    The model is ``r = A z + H d``; H includes the heights of the layers as shares.  Both unknowns
+    have an energy.
     """
 
     r: Floats
@@ -90,13 +91,13 @@ class _Problem:
         return z, d
 
     def left(self, z: Floats, d: Floats, use: Bools) -> float:
-        """Return the mean square that z and d leave at some of the points."""
+        """Return the mean squared residual of z and d at some of the points."""
         rest = self.r[use] - self.A[use] @ z - self.H[use] @ d
         return float(np.mean(rest**2))
 
 
 def sharpen_layers(fitted: FittedSheet, points: Floats, most: int = MOST) -> FittedSheet | None:
-    """Return the sheet fitted through all layers of the points, or None where there are none.
+    """Return the sheet fitted through all layers of the points; None if there are no layers.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def sharpen_layers(fitted: FittedSheet, points: Floats, most: int = MOST) -> Fit
     points : (n, 3) float
         Blocks, working units.
     most : int
-        Points used at most; an even part of them if there are more.
+        Largest number of points used; an evenly spread part if there are more.
     """
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     if len(points) > most:

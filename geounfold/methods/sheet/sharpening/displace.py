@@ -1,4 +1,4 @@
-"""Moving a spline surface along its normals: bases, energies, feet that follow."""
+"""Displacement of a spline surface along its normals: bases, and updated feet of points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from geounfold.methods.sheet.mid_surface.surface import Foot, MidSurface, newton
 
 
 def node_normals(sheet: MidSurface) -> Floats:
-    """Return the sheet's unit normals at its coefficients, inside the spline's range."""
+    """Return the sheet's unit normals at its coefficients, clipped to the spline's range."""
     grid = sheet.grid
     ij = np.stack(np.unravel_index(np.arange(grid.size), grid.shape), axis=1)
     ij = np.clip(ij, 1, np.array(grid.shape) - 2)
@@ -21,8 +21,8 @@ def node_normals(sheet: MidSurface) -> Floats:
 def displacement_basis(sheet: MidSurface, nodes: Floats, U: Floats, normal: Floats) -> sp.csr_array:
     """Return the matrix (n, size) from displacements of the coefficients to heights at U.
 
-    Coefficients move along ``nodes`` (size, 3), their own normals; the height is measured
-    along ``normal`` (n, 3), the surface's at U (n, 2).
+    Coefficients move along their own normals ``nodes`` (size, 3).  The height is measured along
+    ``normal`` (n, 3), the surface's normal at U (n, 2).
     """
     A = sheet.grid.basis(U)
     columns = A.indices.reshape(-1, 16)
@@ -34,7 +34,7 @@ def displacement_basis(sheet: MidSurface, nodes: Floats, U: Floats, normal: Floa
 
 
 def follow_feet(sheet: MidSurface, Q: Floats, U: Floats, steps: int) -> Foot:
-    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps alone.
+    """Return the feet of points Q (n, 3) near parameters U (n, 2), by Newton steps only.
 
     Feet stay within the sheet's rectangle; a point without a foot there keeps a large miss.
     """

@@ -1,4 +1,4 @@
-"""Lattice sites at the body's surface: blocks on one side of it, empty places on the other."""
+"""Lattice sites at the body's surface: blocks inside it, empty places outside."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from geounfold.geometry.measures import sorted_distinct
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 PIT = 13
-"""Most blocks among the 26 neighbours of a place outside a plane of any direction."""
+"""Largest number of blocks among the 26 neighbours of a place beyond a plane, in any direction."""
 
 PITS = 0.005
-"""Share of deeper places from which they are taken for missing blocks and say nothing.
+"""Share of empty places with more neighbours from which these count as missing blocks.
 
-Measured: at most 0.002 where no block is missing (inner hinges), 0.015 where 5 % are.
+Missing blocks are not used as empty sites.  Measured: at most 0.002 if no block is missing (inner
+hinges), 0.015 if 5 % are.
 """
 
 
@@ -37,7 +38,7 @@ class Sites:
 
 
 def surface_sites(cells: Ints, steps: Floats, judged: Bools | None = None) -> Sites:
-    """Return the sites at the surface of the blocks, by their 26 neighbours.
+    """Return the sites at the surface of the blocks, from the 26 neighbours of each.
 
     Parameters
     ----------
@@ -46,14 +47,14 @@ def surface_sites(cells: Ints, steps: Floats, judged: Bools | None = None) -> Si
     steps : (3,) float
         Block sides, working units; cell k lies at ``k * steps``.
     judged : (n,) bool, optional
-        Distinct blocks whose neighbours are looked at; all by default.  The neighbours of these,
-        and those of empty sites next to these, must be among the blocks.
+        Distinct blocks whose neighbours are examined; all by default.  The blocks must include
+        their neighbours, and the neighbours of empty sites next to them.
     """
     low = cells.min(axis=0) - 1
     shape = cells.max(axis=0) - low + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
     every = (cells - low) @ stride
-    keys = among = sorted_distinct(every)  # sorted: shifted keys are looked up in order
+    keys = among = sorted_distinct(every)  # sorted, so that shifted keys are looked up in order
     if judged is not None:
         keys = sorted_distinct(every[judged])
     open_ = np.zeros(len(keys), dtype=bool)
@@ -78,6 +79,6 @@ def surface_sites(cells: Ints, steps: Floats, judged: Bools | None = None) -> Si
 
 
 def scatter(points: Floats) -> Floats:
-    """Return a number in [0, 1) per point (n,), even and unrelated to the rows' order."""
+    """Return an evenly spread number in [0, 1) per point (n,), independent of the rows' order."""
     out: Floats = np.mod(points @ np.array([7.1317, 5.7731, 3.3119]), 1.0)
     return out

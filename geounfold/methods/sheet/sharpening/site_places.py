@@ -24,18 +24,21 @@ from geounfold.methods.sheet.sharpening.site_rules import (
 
 
 def clearance(margin: float) -> float:
-    """Return how far on its own side of a horizon a site still says something."""
+    """Return the distance, in blocks, from a horizon to the farthest correct site still used.
+
+    A site farther away on its correct side no longer affects the fit.
+    """
     return max(0.15, 6 * margin)
 
 
 @dataclass(eq=False)
 class Places:
-    """Where the sites lie in the sheet's coordinates; those watched are followed as it moves.
+    """Places of sites in the sheet's coordinates; watched sites are updated as the sheet moves.
 
-    ``farther`` (n,): seen from the farther horizon, not the nearer; ``U`` (n, 2) feet, ``t``
-    (n,) offsets, ``normal`` (n, 3), ``flat`` (n, 2) unfolded parameters, ``slope`` (n,) slip per
-    height; ``half`` (n,) half thickness, ``taper`` (n,) its slope and ``middle`` (n,) offset
-    half-way between the horizons there; ``watched`` (w,) rows.
+    ``farther`` (n,): True if heights are measured from the farther horizon, not the nearer; ``U``
+    (n, 2): feet; ``t`` (n,): offsets; ``normal`` (n, 3): normals; ``flat`` (n, 2): unfolded
+    parameters; ``slope`` (n,): slip per height; ``half`` (n,): half thickness; ``taper`` (n,): its
+    slope; ``middle`` (n,): offset half-way between the horizons; ``watched`` (w,): rows.
     """
 
     sites: Sites
@@ -52,9 +55,9 @@ class Places:
 
     @classmethod
     def of(cls, fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Places:
-        """Return the sites with a foot on a sheet, the rest to be found by `follow`.
+        """Return the sites with a foot on a sheet; `follow` computes the other values.
 
-        Blocks near both horizons are there twice.
+        Blocks near both horizons appear twice.
         """
         sheet = fitted.sheet
         foot = sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
@@ -72,24 +75,24 @@ class Places:
 
     @property
     def side(self) -> Floats:
-        """The horizon each is seen from: +1 the top, -1 the bottom, (n,)."""
+        """The horizon of each site: +1 the top, -1 the bottom, (n,)."""
         return np.where((self.t < self.middle) == self.farther, 1.0, -1.0)
 
     @property
     def beyond(self) -> Floats:
-        """Height over the horizon, (n,): away from the middle of the layer is up."""
+        """Height beyond the horizon, (n,), positive away from the middle of the layer."""
         return self.side * (self.t - self.middle) - self.half
 
     @property
     def right(self) -> Floats:
-        """Distance from the horizon on the side where the site belongs, (n,)."""
+        """Distance from the horizon, (n,), positive on the site's correct side."""
         beyond = self.beyond
         return np.where(self.sites.occupied, -beyond, beyond)
 
     def follow(
         self, sheet: MidSurface, reach: tuple[Floats, Floats], slip: Floats, steps: int
     ) -> None:
-        """Find the watched sites' places anew; ``reach``: coefficients up to top and bottom."""
+        """Update the watched sites; ``reach``: coefficients of the heights up to top and bottom."""
         rows, grid = self.watched, sheet.grid
         foot = follow_feet(sheet, self.sites.points[rows], self.U[rows], steps)
         shear = grid.value(slip, foot.U)
@@ -100,7 +103,7 @@ class Places:
         self.level(sheet.grid, reach)
 
     def level(self, grid: SplineGrid, reach: tuple[Floats, Floats]) -> None:
-        """Find the horizons' heights at the watched sites' places anew."""
+        """Update the horizons' heights at the watched sites."""
         rows, (top, bottom) = self.watched, reach
         half, hu, hv = grid.gradient((top + bottom) / 2, self.flat[rows])
         self.half[rows], self.taper[rows] = half, np.hypot(hu, hv)
@@ -109,15 +112,15 @@ class Places:
         )
 
     def watch(self, margin: float) -> None:
-        """Watch only sites that may be used, or mark the rim, with this margin or a smaller one."""
+        """Watch only sites that may be used, or mark the rim, at this or a smaller margin."""
         near = self.right[self.watched] < clearance(margin) + SLACK
         self.watched = self.watched[near]
 
     def explained(self, margin: float, depth: float, rules: SiteRules) -> Ints:
-        """Return the sites that a horizon explains, not the rim (indices).
+        """Return the sites (indices) that belong to a horizon, not to the rim.
 
-        An empty site well inside the layer lies beyond the rim, and so do those around it; where
-        the layer tapers steeply, horizon and rim are one.
+        An empty site deep inside the layer lies beyond the rim, and so do the sites around it.  If
+        the layer tapers steeply, horizon and rim cannot be told apart.
         """
         beyond, thickness = self.beyond, self.half
         hole = self.holes(depth, rules)
@@ -131,13 +134,13 @@ class Places:
         return out
 
     def holes(self, depth: float, rules: SiteRules) -> Bools:
-        """Return which empty sites lie well inside the layer, (n,): past its rim."""
+        """Return which empty sites lie deep inside the layer, so past its rim, (n,)."""
         deep = -self.beyond > np.minimum(depth, 0.6 * self.half)
         deep &= ~self.sites.occupied & (self.half > rules.thin)
         return deep | self._uncovered(rules)
 
     def _uncovered(self, rules: SiteRules) -> Bools:
-        """Return which empty sites lie in a thin layer where no block is near, (n,)."""
+        """Return which empty sites lie in a thin layer with no block near, (n,)."""
         beyond, occupied = self.beyond, self.sites.occupied
         out: Bools = ~occupied & (beyond < 0) & (self.half <= rules.thin)
         if out.any():

@@ -1,4 +1,4 @@
-"""Which lattice sites a horizon has to separate, and how softly."""
+"""Rules: which lattice sites a horizon has to separate, and how softly."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 DEPTHS = (1.25, 1.0, 0.75)
-"""Depth below the horizon, in blocks and round by round, from which an empty site is a hole."""
+"""Depth below the horizon, in blocks, one per round, from which an empty site is a hole."""
 
 RIM = 1.0
-"""Distance from a hole, in blocks, within which a site belongs to the rim, not to a horizon."""
+"""Distance from a hole, in blocks, up to which a site belongs to the rim, not to a horizon."""
 
 COVER = 0.9
-"""Distance along the sheet, in blocks, from every block beyond which an empty site is a hole.
+"""Distance along the sheet, in blocks, from the nearest block beyond which an empty site is a hole.
 
-This holds only if the layer is thin there (`SiteRules.thin`).
+Used only if the layer is thin there (`SiteRules.thin`).
 """
 
 BAND = 1.2
 """Largest distance of a used site from its horizon, in blocks."""
 
 TAPER = 0.25
-"""Slope of the half thickness above which sites are not used: horizon and rim are one there."""
+"""Slope of the half thickness above which sites are not used: no rim can be told apart there."""
 
 SLACK = 0.5
-"""Distance, in blocks, by which unused sites are followed further, as the sheet moves."""
+"""Distance, in blocks, past the used sites up to which others are updated as the sheet moves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,17 +35,17 @@ class SiteRules:
     Attributes
     ----------
     margins : tuple of float
-        Softness of the separation, round by round.
+        Softness of the separation, one per round.
     thin : float
-        Half thickness up to which the layer counts as thin: an empty site anywhere below the
-        horizon, and far from any block, is then a hole.
+        Half thickness up to which the layer counts as thin.  Then an empty site below the horizon
+        and far from any block is a hole, at any depth.
     thinnest : float
         Half thickness below which sites are not used.
     held : bool
-        Whether steps are limited past the rim as well, where the sheet is only continued.
+        Whether steps are also limited past the rim, over which the sheet is only continued.
     sheared : float
-        Share of the slip by which the distance from the rim grows: slip spreads the sites of the
-        rim along the unfolded layer.
+        Share of the slip added to the distance from the rim, because slip spreads the rim's sites
+        along the unfolded layer.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -57,7 +57,7 @@ class SiteRules:
     def for_cells(self, side: float) -> SiteRules:
         """Return the rules for a sheet that was fitted to cells of ``side`` blocks.
 
-        Such a sheet is farther off at first, so wider margins come before the others.
+        Such a sheet is farther off at first, so wider margins precede the others.
         """
         if side <= 1:
             return self

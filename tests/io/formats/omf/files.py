@@ -12,12 +12,9 @@ from tests.places import TESTS
 
 DATA = TESTS / "data" / "omf"
 
-
 MAKE = runpy.run_path(str(DATA / "make.py"))
 
-
 XYZ = MAKE["XYZ"]
-
 
 SIDES, PLACES = ["dx", "dy", "dz"], ["i", "j", "k"]
 
@@ -37,8 +34,6 @@ def sums_of(frame: pd.DataFrame) -> float:
 # (100, 200, 0): the block at (1, 2, 1) reaches over u 10 to 30, v 10 to 15, w 1 to 3.
 TENSOR_AT = (1, 2, 1)
 
-
 TENSOR_CENTRE, TENSOR_SIDES = [100 - 12.5, 200 + 20.0, 2.0], [20.0, 5.0, 2.0]
-
 
 TENSOR_VOLUME = 30 * 15 * 5

@@ -55,18 +55,17 @@ class Flattener:
     Attributes
     ----------
     name : str
-        Its name in FLATTENERS.
+        Key in FLATTENERS.
     function : callable
         ``function(problem, start, options) -> Flattening``.
     intrinsic : bool
-        Whether it works on edge lengths alone, so that other rest lengths can be given.
+        Whether it uses edge lengths only, so that other rest lengths can be given.
     options : type
-        Its options, a frozen dataclass that checks itself.
+        Class of its options, a frozen dataclass that checks itself.
     keeps : str
-        What it keeps if the surface allows that, and else nearly keeps: ``lengths``,
-        ``angles``, or ``nothing`` but neighbourhood.
+        What it keeps, exactly if the surface allows that: ``lengths``, ``angles`` or ``nothing``.
     free : bool
-        Whether all that it calls is free software; a flattener that is not runs only by its name.
+        Whether all code that it calls is free software; if not, it runs only if the user names it.
     """
 
     name: str
@@ -112,29 +111,28 @@ def flatten(
         A surface of disk topology, holes allowed: one component, (n, 3) vertices, faces
         oriented alike.  The longest border loop is the outer one.
     method : str
-        A name in FLATTENERS.
+        Key in FLATTENERS.
     start : (n, 2) array, optional
-        Flat positions to start from, mirrored back if they are mirrored; by default the
-        method's own, Tutte's embedding for most.
+        Flat positions to start from, mirrored back if they are mirrored; by default the method's
+        own start, which is Tutte's embedding for most.
     rest : (k,) array, optional
         Length that each edge of ``geometry.unique_edges(F)`` should have when flat, in the
-        vertices' unit; by default its length in the mesh.  For intrinsic methods alone.
+        vertices' unit; by default its length in the mesh.  Only for intrinsic methods.
     options : dataclass, optional
         The method's options; by default its defaults.
     repair : bool
-        Whether an answer with triangles folded over or a border that overlaps itself is
-        repaired, or is an error if that fails.  False returns it as it is, its ``flips`` and
-        ``overlaps`` counted.
+        Whether an answer with folded triangles or an overlapping border is repaired; if that fails,
+        an error is raised.  False returns it unchanged, with ``flips`` and ``overlaps`` counted.
 
     Returns
     -------
     Flattening
-        Flat positions in the mesh's unit and vertex order, centred at zero, never mirrored.
-        With ``repair`` the map is proved to be one-to-one: every triangle counter-clockwise and
-        no two border edges meeting, by exact predicates, suffice (Lipman 2014, arXiv
-        1310.0955).  ``note`` names what was done: the vertices about a few folded
-        triangles moved (Garanzha et al. 2021, arXiv 2102.03069); or, for methods that keep
-        lengths, libigl's SLIM from Tutte's embedding instead.
+        Flat positions in the mesh's unit and vertex order, centred at zero, never mirrored.  With
+        ``repair`` the map is proved to be one-to-one by exact predicates: every triangle is
+        counter-clockwise and no two border edges meet (Lipman 2014, arXiv 1310.0955).  ``note``
+        names the repair: vertices around a few folded triangles were moved (Garanzha et al. 2021,
+        arXiv 2102.03069); or, for methods that keep lengths, libigl's SLIM was run from Tutte's
+        embedding instead.
 
     Raises
     ------
@@ -144,8 +142,7 @@ def flatten(
         Unknown method, options of another method, a start or rest lengths of a wrong shape or
         value, or rest lengths for a method that cannot use them.
     FlatteningError
-        The method gave no valid answer, one that has collapsed, or one that is not one-to-one
-        and cannot be repaired.
+        The answer is not valid, has collapsed, or is not one-to-one and cannot be repaired.
 
     Examples
     --------
@@ -162,7 +159,7 @@ def flatten(
     begin = _checked_start(start, len(problem.mesh.V), problem.mesh.F)
     flat = flattener.function(problem, begin, chosen)
     isometric = flattener.keeps == "lengths"
-    # libigl's ARAP has been seen to do so without a word (its bindings' issue 54).
+    # libigl's ARAP may collapse without an error (issue 54 of its bindings).
     if isometric and collapsed(problem, flat.uv):
         raise FlatteningError(
             f"{method}: the flat map has collapsed: most edges have lost their length; take "

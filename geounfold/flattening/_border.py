@@ -1,16 +1,16 @@
-"""Whether a flat map is one-to-one: exact signs of its triangles, exact crossings of its border.
+"""Proof that a flat map is one-to-one: exact signs of triangles, exact crossings of the border.
 
 **Theorem** (Lipman 2014, arXiv 1310.0955, here for the plane).  A continuous map that is linear
 on the triangles of a compact oriented surface, none of them turned over or without area, and
 one-to-one on its border, is one-to-one, provided that one border loop runs counter-clockwise
 about its image and every other one clockwise.
 
-**Why**: a point off the border's image has as many preimages as the border winds round it, since
-no triangle counts negatively.  Loops that are simple and apart wind once round their inside: the
-counter-clockwise one adds one, the others add nothing or take away.  So no point has two.  With
-one loop the direction needs no test: the number of preimages is never negative.  With holes it
-does: a loop that runs the wrong way encloses points that are covered twice, about branch points
-where the angles round a vertex sum to more than a full turn.
+**Proof**: the number of preimages of a point off the border's image equals the winding number of
+the border around it, because no triangle counts negatively.  Simple, disjoint loops wind once
+around their inside: the counter-clockwise one adds 1, the others add 0 or subtract 1.  So no point
+has two preimages.  With one loop its direction needs no test, because the number of preimages is
+never negative.  With holes it does: a loop of the wrong direction encloses points that are covered
+twice, around branch points (vertices whose angles sum to more than a full turn).
 """
 
 from __future__ import annotations
@@ -28,16 +28,15 @@ _FIRST, _SECOND = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """What the flat image of a surface's border shows.
+    """Faults in the flat image of a surface's border.
 
     Attributes
     ----------
     crossings : (q, 2, 2) int
-        Pairs of border edges with images that meet though the edges do not, each edge as its two
-        vertices.
+        Pairs of disjoint border edges whose images meet, each edge as its two vertices.
     turned : int
-        Loops too many that run counter-clockwise, or 1 if none does; counted only if
-        nothing crosses.
+        Number of counter-clockwise loops beyond one, or 1 if there is none; counted only if nothing
+        crosses.
     """
 
     crossings: Ints
@@ -45,7 +44,7 @@ class Border:
 
     @property
     def overlaps(self) -> int:
-        """Return the crossings, or if there are none the loops that run the wrong way."""
+        """Return the number of crossings; if there are none, of loops of the wrong direction."""
         return len(self.crossings) + self.turned
 
 
@@ -61,7 +60,7 @@ def is_one_to_one(uv: Floats, F: Ints, loops: tuple[Ints, ...]) -> bool:
 
 
 def border_of(uv: Floats, loops: tuple[Ints, ...]) -> Border:
-    """Return where the flat border meets itself.
+    """Return the faults of the flat border: pairs of edges that meet, or loops turned over.
 
     Parameters
     ----------
@@ -83,9 +82,9 @@ def border_of(uv: Floats, loops: tuple[Ints, ...]) -> Border:
 def _near_pairs(segments: Floats) -> Ints:
     """Return the pairs (i < j) of segments (k, 2, 2) whose boxes touch, (p, 2).
 
-    Boxes round runs of 1, 2, 4, ... consecutive segments form a tree; pairs of boxes that
-    touch are followed down it.  A border is a curve, so few boxes touch but neighbours:
-    O(k log k) in all, but for borders that are crumpled through and through.
+    Boxes round runs of 1, 2, 4, ... consecutive segments form a tree; pairs of boxes that touch are
+    followed down it.  A border is a curve, so few boxes touch except neighbours: O(k log k) in all,
+    unless the border is crumpled everywhere.
     """
     k = len(segments)
     depth = max(k - 1, 0).bit_length()
@@ -115,7 +114,8 @@ def _meet(uv: Floats, first: Ints, second: Ints) -> Bools:
     apart = ~(first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
     out = np.zeros(len(first), dtype=bool)
     a, b, c, d = (uv[ends] for pair in (first, second) for ends in pair[apart].T)
-    # Each edge has its ends on two sides of the other's line; all on one line: boxes decide.
+    # Edges cross if each has its ends on both sides of the other's line.  If all four ends lie on
+    # one line, the boxes decide.
     split = orientations(a, b, c) * orientations(a, b, d) <= 0
     out[apart] = split & (orientations(c, d, a) * orientations(c, d, b) <= 0)
     out[~apart] = _fold_back(uv, first[~apart], second[~apart])
@@ -123,7 +123,7 @@ def _meet(uv: Floats, first: Ints, second: Ints) -> Bools:
 
 
 def _fold_back(uv: Floats, first: Ints, second: Ints) -> Bools:
-    """Return whether edges with a common vertex lie along one another."""
+    """Return whether edges with a common vertex overlap."""
     reverse = first[:, 0] == second[:, 1]
     before = np.where(reverse[:, None], second, first)
     after = np.where(reverse[:, None], first, second)

@@ -22,7 +22,7 @@ ENERGY_TOL = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A descent: its last sound positions, its steps, why it stopped and what it had to do."""
+    """A descent: last sound positions, number of steps, reason to stop, history and note."""
 
     uv: Floats
     steps: int
@@ -39,20 +39,20 @@ def descend(
     sound: Callable[[Floats], bool],
     energy_tol: float = ENERGY_TOL,
 ) -> Run:
-    """Step until nothing moves; stop before the first step that fails or is not sound.
+    """Step until no vertex moves; stop before the first step that fails or is not sound.
 
     Parameters
     ----------
     problem : Problem
         The checked surface.
     uv : (n, 2) float
-        The start: sound.
+        Start; must be sound.
     step : callable
         Returns the next positions, (n, 2); BackendError if it fails.
     options : IterationOptions
-        When to stop.
+        Conditions to stop.
     sound : callable
-        Whether positions may be kept.
+        ``sound(uv)`` returns whether positions may be kept.
     energy_tol : float
         Stop if a step lowers the energy by no more than this share of its excess over an
         isometry's.

@@ -1,4 +1,4 @@
-"""Flat positions by the distances from a few landmarks: classical scaling.
+"""Flat positions from the distances to a few landmarks, by classical scaling.
 
 The plane that best reproduces the squared distances among landmarks, centred, is spanned by the
 two largest eigenvectors (Torgerson 1952); the other vertices follow from their distances to the
@@ -28,11 +28,11 @@ def to_landmarks(field: Callable[[int], Floats], V: Floats, most: int) -> tuple[
     Parameters
     ----------
     field : callable
-        The distances from a vertex to all vertices, (n,).
+        ``field(i)`` returns the distances from vertex i to all vertices, (n,).
     V : (n, 3) float
         Vertices.
     most : int
-        Number of landmarks; all vertices if there are no more.
+        Number of landmarks; all vertices if there are fewer.
     """
     if len(V) <= most:
         chosen = np.arange(len(V))
@@ -61,7 +61,7 @@ def by_distances(problem: Problem, chosen: Ints, D: Floats, method: str, kind: s
     D : (k, n) float
         Distance of every vertex from each of them, in the mesh's unit.
     method, kind : str
-        The method's name, and what distances they are, for the note.
+        Name of the method and kind of the distances, for the note.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def scaled(D: Floats, chosen: Ints, method: str) -> Floats:
     """
     squared = D * D
     among = squared[:, chosen]
-    among = (among + among.T) / 2  # the heat method's differ one way and back
+    among = (among + among.T) / 2  # distances by the heat method are not symmetric
     mean = among.mean(axis=0)
     values, vectors = np.linalg.eigh(-(among - mean - mean[:, None] + mean.mean()) / 2)
     large, small = values[-1], values[-2]

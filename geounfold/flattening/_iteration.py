@@ -1,4 +1,4 @@
-"""When a flattener that works in steps stops."""
+"""Conditions under which a flattener that works in steps stops."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class IterationOptions:
     Parameters
     ----------
     tol : float
-        Stop if a step moves no vertex by more than this share of the surface's size.
+        Share of the surface's size: iteration stops if a step moves no vertex farther.
     max_iter : int
-        Most steps.
+        Largest number of steps.
 
     Raises
     ------

@@ -19,7 +19,7 @@ def factor(matrix: sp.csc_array, ordered: bool = False) -> spl.SuperLU:
     matrix : (n, n) sparse
         Symmetric; positive definite for a stable answer.
     ordered : bool
-        True when the rows already are in a fill-reducing order.
+        True if the rows are already in a fill-reducing order.
     """
     return spl.splu(
         matrix,
@@ -56,7 +56,7 @@ class PinnedSolver:
     Attributes
     ----------
     place : (n,) int
-        A fill-reducing order, as each vertex's place in it; vertex 0 comes last.
+        Position of each vertex in a fill-reducing order; vertex 0 comes last.
     """
 
     place: Ints
@@ -88,8 +88,8 @@ def preconditioned_solve(
     -------
     (n,) float or None
         The solution with a residual of at most ``tol`` of the load's, measured in the
-        preconditioner; None if that takes more than ``max_iter`` steps, or if the matrix
-        or the preconditioner turns out not to be positive definite.
+        preconditioner; None if that takes more than ``max_iter`` steps, or if the matrix or the
+        preconditioner is not positive definite.
     """
     x, residual = np.zeros_like(load), load.copy()
     z = precondition(residual)

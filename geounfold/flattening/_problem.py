@@ -1,4 +1,4 @@
-"""What every flattener works on: a checked surface with its rest lengths and rest triangles."""
+"""Input of every flattener: a checked surface with its rest lengths and rest triangles."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Problem:
 
 
 def make_problem(mesh: TriMesh, loops: tuple[Ints, ...], rest: Floats | None) -> Problem:
-    """Return the problem of a checked mesh; ``rest`` None takes the edges' own lengths."""
+    """Return the problem of a checked mesh; ``rest`` None: the lengths of the mesh's edges."""
     edges = unique_edges(mesh.F)
     own = lengths(mesh.V, edges)
     wanted = own if rest is None else np.array(rest, dtype=np.float64)

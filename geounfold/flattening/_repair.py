@@ -1,4 +1,4 @@
-"""From an answer that folds or overlaps to one that is one-to-one, or to an error."""
+"""Repair of an answer that folds or overlaps: a one-to-one answer, or an error."""
 
 from __future__ import annotations
 
@@ -17,37 +17,38 @@ from geounfold.flattening._unflip import untangle
 from geounfold.flattening.measures import symmetric_dirichlet
 from geounfold.geometry.mesh import Floats
 
-#: When the descents of the ladder stop: their energy then is within a few per cent of its least.
+# : Conditions to stop the descents of the ladder; their energy is then within a few per cent of its
+# minimum.
 _ENOUGH = IterationOptions(tol=1e-3, max_iter=50)
 _ENOUGH_ENERGY = 1e-2
 
 
 def one_to_one(problem: Problem, flat: Flattening, isometric: bool) -> Flattening:
-    """Return a flattening that is one-to-one: the one given, or the first rung's that is.
+    """Return a one-to-one flattening: the one given, or that of the first rung that gives one.
 
-    1. *Untangling*: the vertices about a few turned triangles are moved, all others stay.
-    2. *SLIM* from Tutte's embedding, for isometric methods and the mesh's own lengths alone;
+    1. *Untangling*: the vertices around a few turned triangles are moved, all others stay. 2.
+    *SLIM* from Tutte's embedding, only for isometric methods and the mesh's own lengths;
        nothing flips.
-    3. The last one-to-one step of 2, if its border came to overlap.  Scaffold maps would go
-       on from there, but their mesh around the surface is Triangle's, which is not free
-       software: ``scaf`` is there for those who may use it.
+    3. The last one-to-one step of 2, if its border came to overlap.  Scaffold maps could continue
+    from there, but they mesh the surroundings with Triangle, which is not free software; users who
+    may run it can choose ``scaf``.
 
-    The answer keeps its method's name; its note names what was done.
+    The answer keeps its method's name; its note names the rung.
 
     Parameters
     ----------
     problem : Problem
         The surface.
     flat : Flattening
-        What the method gave.
+        Answer of the method.
     isometric : bool
-        Whether the method aims at lengths, so that 2 and 3 may stand in for it.
+        Whether the method keeps lengths, so that 2 and 3 may replace it.
 
     Raises
     ------
     FlatteningError
-        No rung gives a one-to-one map: how many triangles are folded over and how many pairs of
-        border edges overlap, and where.
+        No rung gives a one-to-one map.  The message counts folded triangles and overlapping pairs
+        of border edges, and names the first place.
     """
     if flat.one_to_one:
         return flat
@@ -60,7 +61,7 @@ def one_to_one(problem: Problem, flat: Flattening, isometric: bool) -> Flattenin
 
 
 def _rungs(problem: Problem, flat: Flattening, isometric: bool) -> Iterator[Flattening]:
-    """Yield what the rungs give, each worked out when the one before it was not enough."""
+    """Yield the answers of the rungs; each is computed only if the one before was not enough."""
     if flat.flips and not flat.overlaps:
         loose = untangle(problem, flat.uv)
         if loose is not None:
@@ -82,7 +83,7 @@ def _rungs(problem: Problem, flat: Flattening, isometric: bool) -> Iterator[Flat
 
 
 def _slim_run(problem: Problem, uv: Floats) -> tuple[Run, Floats]:
-    """Return SLIM's descent from Tutte's embedding and its last step that is one-to-one."""
+    """Return SLIM's descent from Tutte's embedding and its last one-to-one step."""
     F, loops, last = problem.mesh.F, problem.loops, uv
 
     def sound(flat: Floats) -> bool:
@@ -112,7 +113,7 @@ def _energy(problem: Problem, uv: Floats) -> float:
 
 
 def _counts(flat: Flattening) -> str:
-    """Return what is wrong with a flattening, in words."""
+    """Return the faults of a flattening as a phrase."""
     parts = []
     if flat.flips:
         parts.append(f"{flat.flips} of {len(flat.mesh.F)} triangles are folded over")
@@ -124,7 +125,7 @@ def _counts(flat: Flattening) -> str:
 
 
 def _place(flat: Flattening) -> str:
-    """Return where the first fault lies on the folded surface."""
+    """Return the place of the first fault on the folded surface, as a phrase."""
     mesh = flat.mesh
     if flat.flips:
         at = mesh.V[mesh.F[turned_over(flat.uv, mesh.F)[0]]].mean(axis=0)

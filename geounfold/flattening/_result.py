@@ -1,4 +1,4 @@
-"""What every flattener takes and returns."""
+"""Result of every flattener."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ class Flattening:
     iterations : int
         Steps taken; 0 for a direct solve.
     energy, area_error, edge_error : (k,) float
-        One value per recorded step: the method's energy, the relative area difference E_s
-        (Wang 2002) and the root mean square edge strain.  If a fall-back gave the answer,
-        they and ``stop`` are the fall-back's.
+        One value per recorded step: the method's energy, the relative area difference E_s (Wang
+        2002) and the root mean square edge strain.  If the answer is that of a fall-back, these and
+        ``stop`` are the fall-back's too.
     flips : int
         Triangles whose flat area is not positive, by an exact predicate.
     note : str
-        What the method had to do beyond its plain course (a fall-back, a safeguard); else empty.
+        Fall-back or safeguard that was needed; else empty.
     loops : tuple of (b,) int
         Border loops in face direction, the longest first.
     """
@@ -65,15 +65,15 @@ class Flattening:
 
     @cached_property
     def border(self) -> Border:
-        """Return where the flat border meets itself; computed once."""
+        """Faults of the flat border; computed once."""
         return border_of(self.uv, self.loops)
 
     @property
     def overlaps(self) -> int:
         """Return the number of pairs of border edges whose flat images meet, by exact tests.
 
-        If there are none, the border loops that run the wrong way round (a hole turned inside
-        out) are counted instead.
+        If there are none, border loops of the wrong direction (a hole turned inside out) are
+        counted instead.
         """
         return self.border.overlaps
 

@@ -21,7 +21,7 @@ def spring_energy(uv: Floats, edges: Ints, rest: Floats) -> float:
 def spring_forces(uv: Floats, edges: Ints, rest: Floats) -> Floats:
     """Return f(P_i) = sum_j (|P_i P_j| - d_j) n_ij, (n, 2): minus the energy's gradient.
 
-    An edge of no length pulls nowhere.
+    An edge of no length exerts no force.
     """
     along, length = _directions(uv, edges)
     pull = (length - rest)[:, None] * along
@@ -36,8 +36,8 @@ def spring_forces(uv: Floats, edges: Ints, rest: Floats) -> Floats:
 def spring_blocks(uv: Floats, edges: Ints, rest: Floats, convex: bool) -> Floats:
     """Return the second derivative of each spring, (k, 2, 2), for C = 1.
 
-    ``e e' + (1 - d/l)(I - e e')``; a shortened spring's negative part is left out if
-    ``convex`` is set.
+    ``e e' + (1 - d/l)(I - e e')``; with ``convex`` the negative part of shortened springs is left
+    out.
     """
     e, length = _directions(uv, edges)
     across = 1 - rest / np.maximum(length, np.finfo(float).tiny)
@@ -64,7 +64,7 @@ class BlockPattern:
     edges : (k, 2) int
         Vertex pairs.
     place : (n,) int
-        Row of each vertex's block.
+        Position of each vertex's block in the fill-reducing order.
     """
 
     def __init__(self, edges: Ints, place: Ints) -> None:
@@ -73,7 +73,7 @@ class BlockPattern:
         row = np.concatenate([np.arange(n), i, j])
         column = np.concatenate([np.arange(n), j, i])
         slot = np.empty(n + 2 * k, dtype=np.int64)
-        # By rows, then by columns: sorted in both without a sort.
+        # Converted by rows, then by columns, so that both are in order without a sort.
         entries = sp.coo_array((np.arange(n + 2 * k), (row, column)), shape=(n, n))
         slot[entries.tocsr().tocsc().data] = np.arange(n + 2 * k)
         count = np.bincount(column, minlength=n)

@@ -1,4 +1,4 @@
-"""The start of every flattener: what surface can be flattened, and its first flat positions."""
+"""The start of every flattener: check of the surface, and first flat positions."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     Raises
     ------
     MeshError
-        No faces; vertices not in 3-D or in no face; a degenerate face; faces that are not
-        manifold or not oriented alike; several components; no border; handles.
+        No faces; vertices that are not in 3-D or belong to no face; a degenerate face; faces that
+        are not manifold or not oriented alike; several components; no border; handles.
     """
     _check_faces(mesh)
     F, n = mesh.F, len(mesh.V)
@@ -43,8 +43,8 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     loops = backend.boundary_loops(F)
     if not loops:
         raise MeshError("the surface is closed: it has no border, so it cannot be flattened")
-    # With one component and simple loops, every handle takes two off Euler's number, and every
-    # vertex where fans of faces touch takes one.
+    # With one component and simple loops, every handle lowers Euler's number by two, and every
+    # vertex at which fans of faces touch lowers it by one.
     missing = 2 - len(loops) - (n - len(unique_edges(F)) + len(F))
     if missing and not backend.is_manifold(F):
         raise MeshError(NOT_MANIFOLD)
@@ -56,7 +56,7 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
 
 
 def _misfit(F: Ints, n: int) -> int:
-    """Return a vertex with a directed edge used twice, or on two borders; -1 for none."""
+    """Return a vertex of a directed edge used twice, or on two borders; -1 if there is none."""
     sides = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     key = np.sort(sides[:, 0] * n + sides[:, 1])
     twice = key[1:] == key[:-1]
@@ -70,7 +70,7 @@ def _misfit(F: Ints, n: int) -> int:
 
 
 def _check_faces(mesh: TriMesh) -> None:
-    """Raise MeshError for vertices or single faces that no flattener can use."""
+    """Raise MeshError for vertices or faces that no flattener can use."""
     V, F = mesh.V, mesh.F
     if not len(F):
         raise MeshError("the surface has no faces")
@@ -117,7 +117,7 @@ def tutte(problem: Problem) -> Floats:
 
 
 def plan(problem: Problem) -> Floats:
-    """Return the vertices on the plane that fits them best, (n, 2), centred.
+    """Return the vertices projected on their best-fit plane, (n, 2), centred.
 
     Triangles that are turned over in space, as on an overturned limb, are folded over.
     """

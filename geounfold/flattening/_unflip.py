@@ -5,9 +5,9 @@ Garanzha et al. 2021 (arXiv 2102.03069): the energy
     sum over triangles of A (tr(J'J) + det^2 J + 1) / chi(det J),
     chi(d) = (d + sqrt(e^2 + d^2)) / 2,
 
-is finite for turned triangles and rises without bound with -d as e falls; J is the map's
-derivative on the triangle.  It is brought down by L-BFGS while e follows the worst determinant,
-``e^2 = 1e-12 + 0.04 min(0, det)^2``.  If nothing is turned, its minimum is an isometry.
+is finite for turned triangles, and grows without bound as e falls if d < 0; J is the map's
+derivative on the triangle.  L-BFGS minimises it in rounds; e follows the worst determinant, ``e^2 =
+1e-12 + 0.04 min(0, det)^2``.  If no triangle is turned, the minimum is an isometry.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from geounfold.flattening._border import turned_over
 from geounfold.flattening._problem import Problem
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
-#: Rings of triangles about the turned ones whose vertices may move, from few to many.
+#: Rings of triangles around the turned ones whose vertices may move, from few to many.
 RINGS = (1, 3, 8)
 
 #: Rounds of L-BFGS, each with its own e, and steps in a round.
 ROUNDS, STEPS = 12, 60
 
-#: Share of turned triangles above which patches are no repair.
+#: Share of turned triangles above which patches are not tried.
 MOST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Untangled:
-    """Positions without turned triangles, and how many vertices were free to move."""
+    """Positions without turned triangles, and the number of vertices free to move."""
 
     uv: Floats
     moved: int
@@ -62,7 +62,7 @@ def untangle(problem: Problem, uv: Floats) -> Untangled | None:
 
 
 def _patch(F: Ints, turned: Ints, rings: int, n: int) -> Bools:
-    """Return the vertices of some faces and of ``rings - 1`` rings of faces round them, (n,)."""
+    """Return the vertices of some faces and of ``rings - 1`` rings of faces around them, (n,)."""
     free = np.zeros(n, dtype=bool)
     free[F[turned]] = True
     for _ in range(rings - 1):
@@ -71,7 +71,7 @@ def _patch(F: Ints, turned: Ints, rings: int, n: int) -> Bools:
 
 
 def _relaxed(problem: Problem, uv: Floats, free: Bools) -> Floats:
-    """Return the positions at the least energy, the vertices that are not free held."""
+    """Return the positions of least energy; vertices that are not free stay."""
     faces = free[problem.mesh.F].any(axis=1)
     F, z = problem.mesh.F[faces], problem.corners[faces]
     energy = _Energy(F, z, problem.areas[faces] / problem.areas[faces].sum())
@@ -126,7 +126,7 @@ class _Energy:
         a, b = self._columns(uv)
         det = (np.conj(a) * b).imag
         root = np.hypot(floor, det)
-        # Without cancellation if the determinant is negative.
+        # This form does not cancel if the determinant is negative.
         chi = np.where(det > 0, (det + root) / 2, floor * floor / (2 * (root - np.minimum(det, 0))))
         top = (a * np.conj(a)).real + (b * np.conj(b)).real + det * det + 1
         by_det = (2 * det - top / root) / chi

@@ -10,20 +10,20 @@ from geounfold.flattening._problem import Problem, displacement, edge_of_side, f
 from geounfold.geometry.mesh import Floats
 
 #: The rigid steps end if one moves no vertex by more than this share of the surface's size, or
-#: after so many.
+#: after this number.
 TOL, STEPS = 1e-3, 60
 
 
 class RigidSteps:
     """Local-global steps of the ARAP energy on rest triangles (Liu et al. 2008).
 
-    Each step turns every rest triangle to its image and solves one Laplacian system, factored
-    once.  It works on rest lengths alone, so it also serves lengths along arcs.
+    Each step turns every rest triangle to its image and solves one Laplacian system, factored once.
+    It uses rest lengths only, so it also works for lengths along arcs.
 
     Attributes
     ----------
     laplacian : PinnedSolver
-        Solves the cotangent Laplacian's systems; holds a fill-reducing order of the vertices.
+        Solver of the cotangent Laplacian; includes a fill-reducing order of the vertices.
     """
 
     laplacian: PinnedSolver

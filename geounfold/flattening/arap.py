@@ -28,20 +28,20 @@ class ArapOptions(IterationOptions):
 def arap(problem: Problem, start: Floats | None, options: ArapOptions) -> Flattening:
     """Flatten by libigl's ARAP, ``sum A (s1 - 1)^2 + A (s2 - 1)^2`` over the faces.
 
-    libigl's ARAP does not bar triangles from flipping (libigl issue 680): flips are counted and
-    named in the note.  Positions that are not finite (issue 2439) are a FlatteningError.
+    libigl's ARAP does not prevent flipped triangles (libigl issue 680): flips are counted in the
+    note.  Positions that are not finite (issue 2439) raise FlatteningError.
 
     Parameters
     ----------
     problem : Problem
         The checked surface; its rest lengths are its edges' own.
     start : (n, 2) float or None
-        Flat positions to start from; None takes Tutte's embedding.
+        Flat positions to start from; None for Tutte's embedding.
     options : ArapOptions
-        When to stop.
+        Conditions to stop.
     """
     uv = tutte(problem) if start is None else start
-    # A common size for every unit: libigl's solver has absolute thresholds.
+    # Scaled to a common size, because libigl's solver has absolute thresholds.
     V, F, size = problem.mesh.V, problem.mesh.F, problem.size
     history = History.empty(problem)
     history.record(uv, arap_energy(V, F, uv))

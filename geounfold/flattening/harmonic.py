@@ -22,9 +22,9 @@ class HarmonicOptions:
 def harmonic(problem: Problem, start: Floats | None, options: HarmonicOptions) -> Flattening:
     """Map onto the disk of the surface's area, the border spaced by its lengths.
 
-    The map has the least Dirichlet energy: its weights are cotangents.  These may be negative at
-    obtuse angles and then fold triangles.  Tutte's embedding (1963), which is one-to-one, replaces
-    such a map, with a note.  Both are direct solves, so a start changes nothing.
+    The map has the least Dirichlet energy: its weights are cotangents.  At obtuse angles these may
+    be negative and fold triangles; then Tutte's embedding (1963), which is one-to-one, replaces the
+    map, with a note.  Both are direct solves, so a start has no effect.
 
     Parameters
     ----------

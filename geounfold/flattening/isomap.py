@@ -16,8 +16,8 @@ from geounfold.flattening._result import Flattening
 from geounfold.geometry.measures import lengths
 from geounfold.geometry.mesh import Floats, Ints
 
-#: Relative difference of distances that is rounding: neighbours as far as the last one of k are
-#: all taken, so that the order of the vertices decides nothing.
+#: Relative difference of distances that counts as rounding.  All neighbours as far as the last of
+#: the k are taken, so that the result does not depend on the order of the vertices.
 TIE = 1e-6
 
 
@@ -28,10 +28,11 @@ class IsomapOptions:
     Parameters
     ----------
     neighbours : int
-        Nearest vertices in space that each vertex is joined to, and others as near as the last.
+        Number of nearest vertices in space that each vertex is joined to; ties with the last are
+        joined too.
     landmarks : int
-        Vertices from which paths are measured, spread as far apart as possible; all vertices if
-        there are no more.
+        Number of vertices from which paths are measured, spread as far apart as possible; all
+        vertices if there are fewer.
     """
 
     neighbours: int = 16
@@ -45,14 +46,14 @@ class IsomapOptions:
 def isomap(problem: Problem, start: Floats | None, options: IsomapOptions) -> Flattening:
     """Flatten by landmark Isomap (Tenenbaum et al. 2000; de Silva and Tenenbaum 2004).
 
-    Vertices are joined to their nearest ones in space (16, as in Unfolding.jl), distances are
-    the shortest paths through this graph, and classical scaling follows
-    (``_classical_scaling``).  The surface's own edges are joined too, so that the graph is always
-    in one piece.
+    Vertices are joined to their nearest ones in space (16, as in Unfolding.jl), distances are the
+    shortest paths through this graph, and classical scaling follows (``_classical_scaling``).  The
+    surface's own edges are joined too, so that the graph is always connected.
 
-    It errs in two ways that ``mds`` does not: paths zigzag, by some per cent; and if limbs are
-    nearer to each other than a few edges, paths cut through between them and the map folds.  Like
-    ``mds`` it needs a convex flat image.  A direct solve, so a start changes nothing.
+    It has two errors that ``mds`` has not.  Paths zigzag, so distances are too long by some per
+    cent; and if limbs are nearer to each other than a few edges, paths take short cuts between them
+    and the map folds.  Like ``mds`` it needs a convex flat image.  It is a direct solve, so a start
+    has no effect.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def isomap(problem: Problem, start: Floats | None, options: IsomapOptions) -> Fl
 def _graph(V: Floats, edges: Ints, neighbours: int) -> sp.csr_array:
     """Return the lengths between near vertices and along edges, (n, n), both ways."""
     n = len(V)
-    # The nearest one is the vertex itself; twice as many hold all that tie, on lattices too.
+    # The nearest one is the vertex itself; twice as many include all ties, on lattices too.
     near, index = (np.asarray(a) for a in cKDTree(V).query(V, k=min(2 * neighbours + 1, n)))
     last = near[:, min(neighbours, near.shape[1] - 1), None]
     row, column = np.nonzero(near <= last * (1 + TIE))

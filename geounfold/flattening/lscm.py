@@ -18,23 +18,22 @@ from geounfold.geometry.mesh import Floats, Ints
 
 @dataclass(frozen=True, kw_only=True)
 class LscmOptions:
-    """Options of ``lscm``: it has none, it is a direct solve."""
+    """Options of ``lscm``: it has none."""
 
 
 def lscm(problem: Problem, start: Floats | None, options: LscmOptions) -> Flattening:
     """Flatten by libigl's LSCM, scaled so that the flat area is the folded area.
 
-    The two outermost border vertices of the start are pinned.  Where libigl fails, returns
-    positions that are not finite or collapses the surface (issues 2409 and 54), a second
-    pair across the first is tried, with a note; if it fails too, FlatteningError.
-    A conformal map keeps angles, not lengths.
+    The two outermost border vertices of the start are pinned.  If libigl fails, returns positions
+    that are not finite or collapses the surface (issues 2409 and 54), a second pair across the
+    first is tried, with a note.  A conformal map keeps angles, not lengths.
 
     Parameters
     ----------
     problem : Problem
         The checked surface; its rest lengths are its edges' own.
     start : (n, 2) float or None
-        Flat positions whose border gives the pins; None takes Tutte's embedding.
+        Flat positions whose border determines the pins; None for Tutte's embedding.
     options : LscmOptions
         None.
     """
@@ -57,7 +56,7 @@ def lscm(problem: Problem, start: Floats | None, options: LscmOptions) -> Flatte
 
 
 def _pins(loop: Ints, plan: Floats) -> list[Ints]:
-    """Return two pairs of far border vertices, the second across the first."""
+    """Return two pairs of distant border vertices, the second across the first."""
     border = plan[loop] - plan[loop].mean(axis=0)
     axis = np.linalg.svd(border, full_matrices=False)[2]
     return [loop[[int(np.argmin(border @ a)), int(np.argmax(border @ a))]] for a in axis]
@@ -67,7 +66,7 @@ def _solve(problem: Problem, pins: Ints) -> Floats:
     """Return libigl's map with two vertices pinned at their distance in space."""
     V = (problem.mesh.V - problem.mesh.V.mean(axis=0)) / problem.size
     apart = float(np.linalg.norm(V[pins[1]] - V[pins[0]]))
-    # Pins that touch in space (a nearly closed surface) still need a length; scale is free.
+    # Pins that touch in space (a nearly closed surface) still need a distance; its value is free.
     at = np.array([[0.0, 0.0], [max(apart, 1e-3), 0.0]])
     return backend.lscm(V, problem.mesh.F, pins, at) * problem.size
 

@@ -13,8 +13,8 @@ from geounfold.flattening._problem import Problem
 from geounfold.flattening._result import Flattening
 from geounfold.geometry.mesh import Floats
 
-#: Most vertices for which distances are exact shortest paths, whose time grows with n^2 log n;
-#: beyond, the heat method's.
+#: Largest number of vertices with exact shortest paths, whose time grows with n^2 log n; above it
+#: the heat method computes the distances.
 EXACT_UP_TO = 600
 
 #: Least height of a triangle, as a share of the surface's median edge, for exact distances: on
@@ -29,8 +29,8 @@ class MdsOptions:
     Parameters
     ----------
     landmarks : int
-        Vertices from which distances are measured, spread as far apart as possible; all vertices
-        if there are no more.
+        Number of vertices from which distances are measured, spread as far apart as possible; all
+        vertices if there are fewer.
     """
 
     landmarks: int = 100
@@ -42,9 +42,9 @@ class MdsOptions:
 def mds(problem: Problem, start: Floats | None, options: MdsOptions) -> Flattening:
     """Flatten by classical scaling of distances along the surface (see ``_classical_scaling``).
 
-    Exact if the surface is developable and its flat image convex.  Else shortest paths bend round
-    the border, and distances are shorter than in the plane.  Triangles may fold.  A direct solve,
-    so a start changes nothing.
+    Exact if the surface is developable and its flat image is convex.  If the image is not convex,
+    shortest paths bend around the border and are longer than in the plane.  Triangles may fold.  It
+    is a direct solve, so a start has no effect.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""How far a flat surface is from its folded one: per-surface figures of distortion.
+"""Distortion of a flattened surface: one figure per surface and measure.
 
-Each takes V (n, 3) folded vertices in any unit, F (m, 3) faces and uv (n, 2) flat positions in
-the same unit.  Stretches are the singular values s1 >= s2 of the map's Jacobian on each face, s2
-negative if the face is flipped; means are weighted by folded area.
+Parameters of each function: V (n, 3) folded vertices in any unit, F (m, 3) faces and uv (n, 2) flat
+positions in the same unit.  Stretches are the singular values s1 >= s2 of the map's Jacobian on
+each face, s2 negative if the face is flipped; means are weighted by folded area.
 """
 
 from __future__ import annotations

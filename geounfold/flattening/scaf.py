@@ -25,21 +25,22 @@ class ScafOptions(IterationOptions):
 
 
 def scaf(problem: Problem, start: Floats | None, options: ScafOptions) -> Flattening:
-    """Flatten by libigl's scaffold maps: the energy of ``slim``, the border kept apart.
+    """Flatten by libigl's scaffold maps: the energy of ``slim``, with a border that cannot overlap.
 
     The plane around the surface and its holes are meshed too, and no triangle of that mesh may
-    flip either: the border cannot meet itself.  Each step is checked by exact predicates; one
-    that is not finite or not one-to-one ends the run at the step before it, with a
-    note.  So the answer is one-to-one whatever libigl does.
+    flip, so the border cannot meet itself.  Each step is checked by exact predicates.  A step that
+    is not finite or not one-to-one ends the run, with a note, and the step before it is returned.
+    So the answer is always one-to-one.
 
     Parameters
     ----------
     problem : Problem
         The checked surface; its rest lengths are its edges' own.
     start : (n, 2) float or None
-        Flat positions to start from; None, or ones not one-to-one, take Tutte's embedding.
+        Flat positions to start from.  Tutte's embedding is used if None or if they are not
+        one-to-one.
     options : ScafOptions
-        When to stop.
+        Conditions to stop.
     """
     F, loops, uv, note = problem.mesh.F, problem.loops, start, ""
     if uv is not None and not is_one_to_one(uv, F, loops):

@@ -26,19 +26,20 @@ class SlimOptions(IterationOptions):
 def slim(problem: Problem, start: Floats | None, options: SlimOptions) -> Flattening:
     """Flatten by libigl's SLIM: the mean of s1^2 + s2^2 + 1/s1^2 + 1/s2^2 over the folded area.
 
-    The energy is infinite if a triangle has no area, and every step stops short of that: nothing
-    flips.  The border may still cross itself.  Each step is checked by an exact
-    predicate; one that is not finite or flips a triangle ends the run at the step before it,
-    with a note.
+    The energy is infinite if a triangle has no area, and every step stops before that, so no
+    triangle flips.  The border may still cross itself.  Each step is checked by an exact predicate.
+    A step that is not finite or flips a triangle ends the run, with a note, and the step before it
+    is returned.
 
     Parameters
     ----------
     problem : Problem
         The checked surface; its rest lengths are its edges' own.
     start : (n, 2) float or None
-        Flat positions to start from; None, or flipped triangles, take Tutte's embedding.
+        Flat positions to start from.  Tutte's embedding is used if None or if triangles are
+        flipped.
     options : SlimOptions
-        When to stop.
+        Conditions to stop.
     """
     F, uv, note = problem.mesh.F, start, ""
     if uv is not None and len(turned_over(uv, F)):

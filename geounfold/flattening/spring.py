@@ -1,4 +1,4 @@
-"""Wang's spring energy brought to its minimum by Newton's method."""
+"""Wang's spring energy minimised by Newton's method."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ HALVINGS = 30
 #: Newton steps after which folded triangles end a run that has no barrier.
 PATIENCE = 12
 
-#: Edge strain (root mean square) of the projection on a plane up to which it is the start: Tutte's
-#: embedding of a sheet has about as much.
+#: Edge strain (root mean square) up to which the projection on a plane is the start: about that of
+#: Tutte's embedding of a sheet.
 PLANAR = 0.25
 
 #: Edge strain (root mean square) of a given start above which rigid steps come first.
@@ -41,7 +41,7 @@ NEAR = 0.05
 #: Steps of SLIM before the barrier is added, if the start is far from its rest lengths.
 NEARER = 10
 
-#: Residual of a Newton step's equations, as a share of their load: from fine to rough.
+#: Residual of a Newton step's equations, as a share of their load: finest and roughest.
 RESIDUAL = (1e-5, 1e-2)
 
 #: Residual of the first Newton step's equations if the rigid steps' Laplacian replaces the
@@ -49,8 +49,8 @@ RESIDUAL = (1e-5, 1e-2)
 #: twice as many on 100,000 triangles.
 ROUGH, ROUGH_STEPS = 1e-2, 25
 
-#: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard if a vertex
-#: and its neighbours lie on one line.
+#: Isotropic stiffness added to the convex Hessian, in units of C: a safeguard for a vertex on one
+#: line with its neighbours.
 RIDGE = 1e-8
 
 
@@ -61,10 +61,10 @@ class SpringOptions(IterationOptions):
     Parameters
     ----------
     tol : float
-        Stop if a step moves no vertex by more than this share of the surface's size and lowers
-        the energy by no more than this share of itself.
+        Iteration stops if a step moves no vertex by more than this share of the surface's size and
+        lowers the energy by no more than this share of itself.
     max_iter : int
-        Most Newton steps.
+        Largest number of Newton steps.
     """
 
     tol: float = 1e-7
@@ -74,28 +74,28 @@ class SpringOptions(IterationOptions):
 def spring(problem: Problem, start: Floats | None, options: SpringOptions) -> Flattening:
     """Flatten by minimising ``E = sum (|P_i P_j| - d_j)^2 / 2`` (thesis section 2.2.4, C = 1).
 
-    A start of its own, or one far from its rest lengths, is first relaxed by a few rigid (ARAP)
-    steps; then Newton's method minimises the springs' energy, with the exact Hessian if that gives
-    a descent, else without the shortened springs' negative parts.  Springs alone may fold a
-    surface over at its minimum, doubly curved ones above all.  Such an answer is redone from
-    the last start without flips, brought near its rest lengths by a few steps of SLIM, with a
-    barrier against lost triangles added, with a note.
+    The default start, or one far from its rest lengths, is first relaxed by a few rigid (ARAP)
+    steps.  Newton's method then minimises the springs' energy, with the exact Hessian if that gives
+    a descent, else without the negative parts of shortened springs.  At its minimum the springs'
+    energy alone may fold a surface over, most often a doubly curved one.  Then a few steps of SLIM
+    bring the last start without flips near its rest lengths, and the springs relax again with a
+    barrier against folding, with a note.
 
     Parameters
     ----------
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes the projection on the best-fit plane if no
-        triangle is folded over there and lengths are not too far off, else Tutte's embedding.
+        Flat positions to start from.  None: the projection on the best-fit plane if no triangle is
+        folded over there and lengths are not too far off, else Tutte's embedding.
     options : SpringOptions
-        When to stop.
+        Conditions to stop.
 
     Returns
     -------
     Flattening
-        ``energy`` holds the start's, the relaxed start's (if there was one) and each Newton
-        step's energy; with the barrier it includes the barrier's.
+        ``energy`` is that of the start, of the relaxed start (if there was one) and of each Newton
+        step; it includes the barrier's energy if there is a barrier.
     """
     first = _own_start(problem) if start is None else start
     near = 0.0 if start is None else NEAR
@@ -157,7 +157,7 @@ def _strain(problem: Problem, uv: Floats) -> float:
 def _nearer(problem: Problem, uv: Floats) -> Floats:
     """Return a start without flips brought near its rest lengths by a few steps of SLIM.
 
-    The barrier lets Newton's method creep only, from a start far from its rest lengths.
+    From a start far from its rest lengths, the barrier slows Newton's method down to tiny steps.
     """
     if not problem.own or _strain(problem, uv) <= NEAR:
         return uv
@@ -165,7 +165,7 @@ def _nearer(problem: Problem, uv: Floats) -> Floats:
         step, after = SlimSteps(problem.mesh.V, problem.mesh.F, uv), uv
         for _ in range(NEARER):
             after = step()
-    except BackendError:  # the start as it is will do
+    except BackendError:  # SLIM failed: the start is used unchanged
         return uv
     return uv if flip_count(after, problem.mesh.F) else after
 
@@ -175,7 +175,7 @@ def _warm_start(
 ) -> tuple[Floats, Floats | None, int, PinnedSolver]:
     """Return the relaxed start, the last one without flips, the steps taken and a Laplacian.
 
-    A start with an edge strain up to ``near`` stays as it is.
+    A start with an edge strain up to ``near`` is not changed.
     """
     F, n = problem.mesh.F, len(problem.mesh.V)
     unfolded = None if flip_count(start, F) else start
@@ -190,9 +190,9 @@ def _warm_start(
 class _System:
     """The springs (C = 1), with or without the barrier, as a function to minimise.
 
-    ``rough`` solves a Laplacian system with vertex 0 held, (n, 2) to (n, 2): it preconditions the
-    first Newton step, which need not be exact, so that the Hessian is first factored near the
-    minimum, where its factors serve to the end.
+    ``rough`` solves a Laplacian system with vertex 0 held, (n, 2) to (n, 2).  It preconditions the
+    first Newton step, which need not be exact.  So the Hessian is first factored near the minimum,
+    and these factors can be used until the end.
     """
 
     def __init__(
@@ -239,15 +239,15 @@ class _System:
                 return self._pattern.gather(step)
         try:
             self._factors = factor(matrix, ordered=True)
-        except RuntimeError:  # exactly singular: the caller takes the convex Hessian
+        except RuntimeError:  # exactly singular: the caller uses the convex Hessian
             self._factors = None
             return None
         return self._pattern.gather(self._factors.solve(load))
 
     def _rough_step(self, matrix: sp.csc_array, load: Floats) -> Floats | None:
-        """Return the first step solved roughly, (n, 2), or None if the Laplacian serves badly.
+        """Return the first step solved roughly, (n, 2), or None if preconditioning fails.
 
-        Vertex 0 stays, as the Hessian's pins have it.
+        Vertex 0 stays, as with the pins of the Hessian.
         """
         rough, self._rough, pattern = self._rough, None, self._pattern
         assert rough is not None
@@ -259,16 +259,16 @@ class _System:
         return None if step is None else pattern.gather(step)
 
     def _accuracy(self, load: Floats) -> float:
-        """Return how accurately to solve for a step: roughly at first, finely as the forces fall.
+        """Return the residual to solve a step to: rough at first, finer as the forces decrease.
 
-        A share of the load that falls with it keeps Newton's convergence quadratic (Dembo,
-        Eisenstat and Steihaug 1982).
+        If the residual's share of the load decreases with the load, Newton's method still converges
+        quadratically (Dembo, Eisenstat and Steihaug 1982).
         """
         share = float(np.linalg.norm(load)) / self._first_load
         return min(max(share, RESIDUAL[0]), RESIDUAL[1])
 
     def _hessian(self, uv: Floats, convex: bool) -> sp.csc_array:
-        """Return the second derivatives, the rigid motions held."""
+        """Return the second derivatives, with the rigid motions held."""
         blocks = spring_blocks(uv, self.problem.edges, self.problem.rest, convex)
         vertex, edge = self._pattern.stiffness(blocks)
         if self.guard is not None:
@@ -307,12 +307,12 @@ def _pin(uv: Floats, vertex: Floats, far: int) -> None:
 def _descend(
     system: _System, uv: Floats, options: SpringOptions, history: History, patience: int
 ) -> tuple[Floats, int, Stop]:
-    """Return the minimiser, the steps taken and why they ended; each step is recorded.
+    """Return the minimiser, the number of steps and the reason to stop; each step is recorded.
 
-    Folded triangles end it after ``patience`` steps: springs that crumple converge slowly.
+    Folded triangles end it after ``patience`` steps, because a crumpled surface converges slowly.
     """
     tol, size = options.tol, system.problem.size
-    # Energy of a strain of tol everywhere: below it, exactly developable surfaces are done.
+    # Energy of a strain of tol everywhere; below it a surface counts as exactly developable.
     floor = tol**2 * float((system.problem.rest**2).sum()) / 2
     energy = system.energy(uv)
     history.record(uv, energy)
@@ -331,9 +331,9 @@ def _descend(
 
 
 def _one_step(system: _System, uv: Floats, energy: float) -> tuple[Floats, float, float]:
-    """Return positions and energy after one step, and the decrease its model predicts.
+    """Return positions and energy after one step, and the decrease predicted by its model.
 
-    The same positions come back if no decrease was found.
+    The positions are unchanged if no decrease was found.
     """
     force = system.forces(uv)
     predicted = 0.0

@@ -1,4 +1,4 @@
-"""Wang's spring-mass model stepped through time, as the thesis describes it."""
+"""Wang's spring-mass model stepped through time, as described in the thesis."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from geounfold.flattening._warm_start import RigidSteps, relax
 from geounfold.geometry.measures import vertex_sum
 from geounfold.geometry.mesh import Floats
 
-#: Steps between two looks at the energy and displacement (and entries of the history).
+#: Steps between two checks of energy and displacement (and entries of the history).
 WINDOW = 50
 
-#: Relative length below which a change is rounding, not a rebound.
+#: Relative change below which a rise is rounding, not a rebound.
 ROUNDING = 1e-12
 
 #: Valid values of ``stop_rule``.
@@ -36,8 +36,9 @@ STOP_RULES = ("converged", "thesis")
 DAMPING = {"converged": 0.01, "thesis": 0.0}
 
 #: ``time_step^2 w^2`` for a bound ``w`` on the fastest oscillation, by stop rule.  The thesis's
-#: integrator gains energy at a quarter of it per step; the default damping takes more than 0.01
-#: away.  The thesis gives no time step: with 0.05 its rule ends in the 8 to 20 steps it shows.
+#: integrator gains energy by a quarter of this value per step; the default damping removes more
+#: than 0.01.  The thesis states no time step; with 0.05 its rule ends in 8 to 20 steps, as in its
+#: figures.
 STEP = {"converged": 0.01, "thesis": 0.05}
 
 
@@ -48,20 +49,20 @@ class SpringDynamicOptions(IterationOptions):
     Parameters
     ----------
     stop_rule : str
-        ``converged``: see ``tol``.  ``thesis``: at the first step that raises the energy or the
-        area error; the positions before it are kept.
+        ``converged``: by ``tol``.  ``thesis``: at the first step that raises the energy or the area
+        error; the positions before it are kept.
     damping : float or None
-        Share of the velocity lost in each step; None takes 0.01, or 0 with the thesis's stop rule.
+        Share of the velocity lost in each step; None for 0.01, or 0 with the thesis's stop rule.
     time_step : float or None
-        In units of the square root of the mass of a square unit over the spring constant: of the
-        thesis's C, density and time step nothing else matters.  None takes the one that makes
-        ``(time_step w)^2 = 0.01``, or 0.05 with the thesis's stop rule, for a bound ``w`` on the
+        Time step, in units of the square root of the mass of a square unit over the spring
+        constant; the thesis's C, density and time step matter only in this combination.  None for
+        ``(time_step w)^2 = 0.01``, or 0.05 with the thesis's stop rule, with a bound ``w`` on the
         fastest oscillation.
     tol : float
-        Stop if over 50 steps the energy changes by at most this share of itself and no vertex
-        moves by more than this share of the surface's size.
+        Iteration stops if over 50 steps the energy changes by at most this share of itself and no
+        vertex moves by more than this share of the surface's size.
     max_iter : int
-        Most time steps.
+        Largest number of time steps.
     """
 
     stop_rule: str = "converged"
@@ -89,17 +90,17 @@ def spring_dynamic(
     ``a = f / m``, ``v(t + dt) = (1 - damping) (v(t) + dt a)``,
     ``q(t + dt) = q(t) + dt v(t) + dt^2 / 2 a``.
 
-    The thesis's ``stop_rule`` is kept with its defects: it ends after a few steps, with the
-    surface hardly flattened, as soon as the energy rebounds; and never on a surface that is flat
-    already, because nothing ever rises there: ``max_iter`` ends it.
+    The thesis's ``stop_rule`` is kept with its defects.  It ends after a few steps, as soon as the
+    energy rebounds, with the surface hardly flattened.  On a surface that is already flat nothing
+    ever rises, so only ``max_iter`` ends it.
 
     Parameters
     ----------
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes Tutte's embedding after a few rigid (ARAP) steps,
-        or, with the thesis's stop rule, the projection on the best-fit plane.
+        Flat positions to start from.  None: Tutte's embedding after a few rigid (ARAP) steps, or,
+        with the thesis's stop rule, the projection on the best-fit plane.
     options : SpringDynamicOptions
         Stop rule, time step and damping.
     """
@@ -108,7 +109,7 @@ def spring_dynamic(
     motion = Motion(problem, options)
     history = History.empty(problem)
     run = _run_thesis if thesis else _run
-    with np.errstate(over="ignore", invalid="ignore"):  # divergence is looked for, and raised
+    with np.errstate(over="ignore", invalid="ignore"):  # divergence is detected and raised
         uv, count, stop = run(motion, uv, options, history)
     flips = flip_count(uv, problem.mesh.F)
     note = f"{flips} triangles are folded over: springs do not bar it" if flips else ""
@@ -118,7 +119,7 @@ def spring_dynamic(
 def _initial(problem: Problem, options: SpringDynamicOptions) -> Floats:
     """Return the projection on a plane, as in the thesis, or Tutte's embedding relaxed.
 
-    From Tutte's embedding itself the springs often fold over.
+    Without the relaxation the springs often fold over.
     """
     if options.stop_rule == "thesis":
         return plan(problem)
@@ -135,7 +136,7 @@ class Motion:
     options : SpringDynamicOptions
         Damping and time step.
     method : str
-        Whose motion it is, for errors.
+        Name of the method, for error messages.
     """
 
     def __init__(
@@ -162,7 +163,7 @@ class Motion:
         return after
 
     def still(self) -> None:
-        """Take all velocity away."""
+        """Set the velocity to zero."""
         self._velocity = np.zeros_like(self._velocity)
 
     def energy(self, uv: Floats) -> float:
@@ -178,7 +179,7 @@ class Motion:
 def _run(
     motion: Motion, uv: Floats, options: SpringDynamicOptions, history: History
 ) -> tuple[Floats, int, Stop]:
-    """Step until energy and positions rest."""
+    """Step until energy and positions no longer change."""
     p = motion.problem
     floor = options.tol**2 * float((p.rest**2).sum()) / 2
     energy = motion.energy(uv)

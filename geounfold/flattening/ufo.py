@@ -1,4 +1,4 @@
-"""One reference surface by energy release, as the thesis describes U-Fo's."""
+"""One reference surface by energy release, as the thesis describes U-Fo."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from geounfold.flattening._start import plan
 from geounfold.flattening.spring_dynamic import ROUNDING, WINDOW, Motion, SpringDynamicOptions
 from geounfold.geometry.mesh import Floats
 
-#: Relative rise of the energy in the first step from rest that is no rounding but a time step too
-#: large for the springs.
+#: Relative rise of the energy in the first step from rest above which it is not rounding: the time
+#: step is too large for the springs.
 RISE = 1e-9
 
 
@@ -26,13 +26,13 @@ class UfoOptions(IterationOptions):
     Parameters
     ----------
     time_step : float or None
-        In the unit of that of ``spring_dynamic``; None takes the one that flattener has with the
-        thesis's stop rule.
+        Time step, in the unit of ``spring_dynamic``; None for its default with the thesis's stop
+        rule.
     tol : float
-        Stop if over 50 steps the energy changes by at most this share of itself and no vertex
-        moves by more than this share of the surface's size.
+        Iteration stops if over 50 steps the energy changes by at most this share of itself and no
+        vertex moves by more than this share of the surface's size.
     max_iter : int
-        Most time steps.
+        Largest number of time steps.
     """
 
     time_step: float | None = None
@@ -47,30 +47,29 @@ class UfoOptions(IterationOptions):
 def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flattening:
     """Flatten by releasing the springs' energy from the surface's projection on a plane.
 
-    U-Fo itself is closed.  By the thesis (sections 1.1, 2.3.2, 4.1) one reference
-    surface is flattened by a conservative spring model, the one it takes over from Wang: springs
-    along the edges, as long at rest as on the folded surface; masses without damping; the
-    integrator of section 2.2.4; a planar start.  So this is ``spring_dynamic`` with its thesis
-    options, with two differences:
+    U-Fo's code is not public.  According to the thesis (sections 1.1, 2.3.2, 4.1) one reference
+    surface is flattened by a conservative spring model, taken over from Wang: springs along the
+    edges with the folded lengths as rest lengths; masses without damping; the integrator of section
+    2.2.4; a planar start.  So this is ``spring_dynamic`` with its thesis options, with two
+    differences:
 
-    * Each release ends when the springs' energy rises, and the next one starts there at rest,
-      until nothing moves.  The kinetic energy taken away is what is released: without damping
-      the motion would never end.  The thesis ends with the first release.
-    * The area error, at whose rise the thesis stops too, ends nothing: it may rise on the way.
+    * Each release ends when the springs' energy rises; the next one starts there at rest, until no
+      vertex moves.  The kinetic energy removed is the energy released; without damping the motion
+      would never end.  The thesis ends with the first release.
+    * The area error may rise; the thesis also stops when it does.
 
-    From ``spring`` it differs by all that makes that one safe: there are no rigid steps first, no
-    second derivatives, no barrier.  If the projection on the plane overlaps, as that of an
-    overturned fold does, the springs relax with triangles folded over and stay so; the note
-    counts them.
+    Unlike ``spring`` it has no rigid steps first, no second derivatives and no barrier.  If the
+    projection on the plane overlaps, as for an overturned fold, the springs relax with triangles
+    folded over and stay so; the note counts them.
 
     Parameters
     ----------
     problem : Problem
         The checked surface.
     start : (n, 2) float or None
-        Flat positions to start from; None takes the projection on the best-fit plane.
+        Flat positions to start from; None for the projection on the best-fit plane.
     options : UfoOptions
-        Time step and when to stop.
+        Time step and conditions to stop.
 
     Raises
     ------
@@ -83,7 +82,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
         "ufo",
     )
     history = History.empty(problem)
-    with np.errstate(over="ignore", invalid="ignore"):  # divergence is looked for, and raised
+    with np.errstate(over="ignore", invalid="ignore"):  # divergence is detected and raised
         begin = plan(problem) if start is None else start
         uv, count, stop = _release(motion, begin, options, history)
     flips = flip_count(uv, problem.mesh.F)
@@ -94,7 +93,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
 def _release(
     motion: Motion, uv: Floats, options: UfoOptions, history: History
 ) -> tuple[Floats, int, Stop]:
-    """Step until energy and positions rest, the velocity taken away wherever the energy rises."""
+    """Step until energy and positions no longer change; velocity is set to 0 when energy rises."""
     p, tol = motion.problem, options.tol
     scale = float((p.rest**2).sum()) / 2
     energy = motion.energy(uv)
@@ -113,7 +112,7 @@ def _release(
             raise FlatteningError(
                 "ufo: the energy rises in the first step from rest; take a smaller time step"
             )
-        else:  # at rest but for rounding
+        else:  # at rest, to rounding
             history.record(uv, energy)
             return uv, count, Stop.CONVERGED
         if count % WINDOW:

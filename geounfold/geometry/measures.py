@@ -105,7 +105,7 @@ def vertex_normals(V: Floats, F: Ints) -> Floats:
 
 
 def enclosed_volume(V: Floats, F: Ints) -> float:
-    """Return the signed volume inside a closed surface; positive when normals point outwards."""
+    """Return the signed volume inside a closed surface; positive if normals point outwards."""
     C = V - V.mean(axis=0)
     a, b, c = C[F[:, 0]], C[F[:, 1]], C[F[:, 2]]
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
@@ -131,14 +131,14 @@ def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
     Parameters
     ----------
     T : (m, 4) int
-        Tetrahedra, right-handed where upright.
+        Tetrahedra, right-handed if upright.
 
     Returns
     -------
     F : (b, 3) int
         Boundary faces, seen counter-clockwise from outside upright tetrahedra.
     owner : (b,) int
-        Tetrahedron of each.
+        Tetrahedron of each face.
     misglued : (k,) int
         Tetrahedra at faces that more than two share, or that two share from the same side.
 
@@ -176,7 +176,7 @@ def boundary_faces(T: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def bilateral_normals(mesh: TriMesh, adjacency: Ints, sweeps: int, width: float = 0.12) -> Floats:
-    """Return face normals smoothed without blunting creases, (m, 3).
+    """Return face normals smoothed by a filter that keeps creases, (m, 3).
 
     A neighbour's weight is 1/e if 1 - cosine is ``width``.
     """
@@ -201,7 +201,7 @@ def corner_angles(V: Floats, F: Ints) -> Floats:
 
 
 def loop_turning(V: Floats, F: Ints, loop: Ints) -> float:
-    """Return by how much a boundary loop of a surface turns inwards in all, radians.
+    """Return the total turning of a boundary loop of a surface, radians, positive inwards.
 
     The sum of pi less the surface's angle at every vertex of the loop (k,): the total geodesic
     curvature.  Over a surface that can be laid flat it is 2 pi on the outer loop and -2 pi
@@ -212,4 +212,4 @@ def loop_turning(V: Floats, F: Ints, loop: Ints) -> float:
 
 
 LARGEST_COORDINATE = 1e15
-"""Beyond this, neighbouring doubles lie 0.125 or more apart: no block can be told from the next."""
+"""Largest coordinate; beyond it neighbouring doubles lie 0.125 or more apart."""

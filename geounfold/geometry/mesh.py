@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 
 
 def in_space(space: Space, folded: _T, unfolded: _T) -> tuple[_T, _T, Space]:
-    """Return what lies in a space, its twin in the other, and the other's name.
+    """Return the object in a space, its counterpart in the other space, and the other's name.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class TriMesh:
     V : (n, 3) or (n, 2) float
         Vertices, in any length unit.
     F : (m, 3) int
-        Faces; counter-clockwise seen from the side their normal points to.
+        Faces, counter-clockwise seen from the side to which their normal points.
 
     Raises
     ------

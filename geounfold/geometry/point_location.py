@@ -1,12 +1,12 @@
-"""Point location in tetrahedra: a walk from a near one, for many points at a time.
+"""Point location in tetrahedra: a walk from a nearby tetrahedron, for many points at a time.
 
-The walk of every point starts in a tetrahedron found by a grid. It crosses the face beyond which
-the point lies farthest, until there is none. Most walks take one or two steps, each a few
-multiplications for thousands of points at a time. libigl locates the points whose walk leaves
-through the border (as at a fold's inner side) or does not end. libigl is the reference: the
-answers agree, except for points on a face, for which either side is right.
+The walk of every point starts in a tetrahedron found by a grid. Each step crosses the face beyond
+which the point lies farthest, until there is no such face. Most walks take one or two steps, each a
+few multiplications for thousands of points at a time. libigl locates the points whose walk leaves
+through the border (as at a fold's inner side) or does not end. libigl is the reference: the answers
+agree, except for points on a face, for which either side is right.
 
-A point's answer depends on the point and the tetrahedra alone, whatever points come with it.
+A point's answer depends only on the point and the tetrahedra, not on other points in the call.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ ON_FACE = 1e-12
 """Rounding on a face: a barycentric coordinate above minus this counts as not negative."""
 
 STEPS = 24
-"""Most tetrahedra that a walk crosses."""
+"""Largest number of tetrahedra that a walk crosses."""
 
-CELLS = 1 << 22  # most cells of the grid
-_PER_CELL = 1.5  # tetrahedra in a grid's cell, in the mean over those that hold any
-_GROWTH = 2  # cells by which the grid's tetrahedra are spread into empty ones
+CELLS = 1 << 22  # largest number of cells of the grid
+_PER_CELL = 1.5  # mean number of tetrahedra in a grid's cell, over cells that are not empty
+_GROWTH = 2  # number of times that tetrahedra are spread into neighbouring empty cells
 
-_LONGEST = 2048  # cells along an axis
+_LONGEST = 2048  # largest number of cells along an axis
 
 Columns = tuple[Floats, Floats, Floats]
 
@@ -121,7 +121,7 @@ def _inverse_edges(V: Floats, T: Ints) -> Floats:
     a, b, c = (V[T[:, k]] - V[T[:, 0]] for k in (1, 2, 3))
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     volume = np.einsum("ij,ij->i", a, bc)
-    volume[volume == 0] = np.nan  # NaN fails every comparison, so a flat one holds no point
+    volume[volume == 0] = np.nan  # NaN fails every comparison, so a flat tetrahedron holds no point
     out: Floats = np.concatenate([bc.T, ca.T, ab.T]) / volume
     return out
 
@@ -145,7 +145,7 @@ def _across(T: Ints) -> Numbers:
 
 
 class _Grid:
-    """A tetrahedron near every place: one for each cell of a grid over the vertices."""
+    """A nearby tetrahedron for every place: one for each cell of a grid over the vertices."""
 
     def __init__(self, V: Floats, T: Ints) -> None:
         low, high = V.min(axis=0), V.max(axis=0)
@@ -165,7 +165,7 @@ class _Grid:
 
     @staticmethod
     def _size(low: Floats, high: Floats, middle: Floats) -> float:
-        """Return the cells' side: about _PER_CELL middles to a cell that holds any."""
+        """Return the side of the cells: about _PER_CELL middles in a cell that is not empty."""
         extent = np.maximum(high - low, 1e-9 * float((high - low).max()))
         size = float(np.cbrt(extent.prod() * _PER_CELL / len(middle)))
         least = max(float(np.cbrt(extent.prod() / CELLS)), float(extent.max()) / _LONGEST)
@@ -179,7 +179,7 @@ class _Grid:
         return max(size, least)
 
     def _cell(self, x: Floats, y: Floats, z: Floats) -> Numbers:
-        """Return the number of the cell of each place, which lies in the grid."""
+        """Return the number of the cell that holds each place; places must lie in the grid."""
         number = np.zeros(len(x), dtype=np.int32)
         for axis, column in enumerate((x, y, z)):
             number *= self._shape[axis]
@@ -187,7 +187,7 @@ class _Grid:
         return number
 
     def start(self, x: Floats, y: Floats, z: Floats) -> Numbers:
-        """Return a tetrahedron near each place, (k,); -1 far from all."""
+        """Return a tetrahedron near each place, (k,); -1 if it is far from all."""
         number = np.zeros(len(x), dtype=np.int32)
         beyond = np.zeros(len(x), dtype=bool)
         for axis, column in enumerate((x, y, z)):
@@ -203,7 +203,7 @@ class _Grid:
 
 
 def _spread(grid: Numbers) -> None:
-    """Give every empty cell of a grid the greatest of what its six neighbours hold, in place."""
+    """Set every empty cell of a grid to the largest value of its six neighbours, in place."""
     spread = grid.copy()
     for axis in range(3):
         ahead = tuple(slice(1, None) if k == axis else slice(None) for k in range(3))

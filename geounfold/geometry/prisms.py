@@ -10,9 +10,9 @@ from geounfold.geometry.mesh import Bools, Ints
 def prism_tets(F: Ints, n: int, layers: int) -> Ints:
     """Return the tetrahedra between stacked layers of a triangulation.
 
-    Layer k holds vertices ``k n .. (k + 1) n - 1``, each above the same vertex of the layer
-    below it, on the side the counter-clockwise faces look to.  Every prism is cut by its
-    vertices' order (a < b < c), so that neighbours share their diagonals.
+    Layer k holds vertices ``k n .. (k + 1) n - 1``, each above the same vertex of the layer below
+    it, on the side of the faces' normals.  Every prism is cut by the order of its vertices (a < b <
+    c), so that neighbours share their diagonals.
 
     Parameters
     ----------
@@ -46,10 +46,10 @@ def prism_tets(F: Ints, n: int, layers: int) -> Ints:
 
 
 def whole_prisms(T: Ints) -> tuple[Ints, Ints]:
-    """Return the prisms among tetrahedra that ``prism_tets`` made, wherever they stand.
+    """Return the prisms among tetrahedra made by ``prism_tets``, in any position.
 
-    Rows may be left out, or moved as long as those of one prism keep their order: what is left of
-    a prism that lost one makes none.
+    Rows may be left out, or moved as long as those of one prism keep their order.  A prism that
+    lost a row is not returned.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def whole_prisms(T: Ints) -> tuple[Ints, Ints]:
     rows : (p, 3) int
         The tetrahedra of each prism, in the order of ``prism_tets``; sorted by the first.
     corners : (p, 6) int
-        Its vertices a, b, c (a < b < c when it was cut) and those above them.
+        Vertices a, b, c of each prism (a < b < c when it was cut) and those above them.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def whole_prisms(T: Ints) -> tuple[Ints, Ints]:
         found.append(np.column_stack([rows, base, z[:, 1 - at], y[:, 2:]]))
     table = np.concatenate(found)
     table = table[_distinct(table[:, 3:])]
-    # The neighbour's second tetrahedron may look like a third; its own first tells it.
+    # The neighbour's second tetrahedron may look like a third; its first one distinguishes it.
     table = table[~np.isin(table[:, 2], table[:, 1])]
     uneven = np.abs(table[:, 2] - 2 * table[:, 1] + table[:, 0])
     table = table[np.lexsort((uneven, table[:, 0]))]
@@ -100,7 +100,7 @@ def _matching(wanted: Ints, offered: Ints) -> Ints:
     """Return the first row of (m, 3) that equals each wanted row (k, 3); -1 if none does."""
     both = np.concatenate([offered, wanted])
     key = np.zeros(len(both), np.int64)
-    for column in both.T:  # numbered anew by every column: no product of three numbers overflows
+    for column in both.T:  # renumbered each time, so that no product of three overflows
         key = np.unique(key * (int(both.max()) + 1) + column, return_inverse=True)[1]
     order = np.argsort(key[: len(offered)], kind="stable")
     there = key[: len(offered)][order]

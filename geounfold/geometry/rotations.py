@@ -13,13 +13,13 @@ def axis_angle_rotation(from_vec: Floats, to_vec: Floats) -> Floats:
 
     Rodrigues' formula ``R = I + sin(theta) K + (1 - cos(theta)) K^2`` with K the cross-product
     matrix of the *unit* axis ``from x to`` (see the module's note on the thesis's own code).
-    Beyond a right angle it is composed of a half turn and a small turn about the same axis,
-    which keeps it exact up to opposite directions, where any axis across them would do.
+    Beyond a right angle it is composed of a half turn and a small turn about the same axis, which
+    keeps it exact up to opposite directions; for these any axis across them is correct.
 
     Parameters
     ----------
     from_vec, to_vec : (3,) float
-        Any length but zero; ``R @ from_vec`` is along ``to_vec``.
+        Directions, of any length but zero; ``R @ from_vec`` is along ``to_vec``.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def _direction(vector: Floats) -> Floats:
 
 
 def _small_turn(a: Floats, b: Floats) -> Floats:
-    """Rodrigues' rotation of unit a to unit b, at most a right angle apart."""
+    """Return Rodrigues' rotation of unit a to unit b, at most a right angle apart."""
     x, y, z = np.cross(a, b)
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     out: Floats = np.eye(3) + K + K @ K / (1 + a @ b)
@@ -62,7 +62,7 @@ def _small_turn(a: Floats, b: Floats) -> Floats:
 def rotate(points: Floats, matrix: Floats) -> tuple[Floats, Floats, Floats]:
     """Return a matrix times each point (n, 3), by columns, (n,) each.
 
-    Not by the linear algebra library, whose rounding depends on a row's place among the others.
+    The linear algebra library is not used, because its rounding depends on a row's position.
     """
     x, y, z = points.T
     a, b, c = (x * row[0] + y * row[1] + z * row[2] for row in matrix)
@@ -70,7 +70,7 @@ def rotate(points: Floats, matrix: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def rotation_from_angles(bearing: float, plunge: float, dip: float) -> Floats:
-    """Return axes (3, 3) turned as block models are: rows x, y, z in world coordinates.
+    """Return axes (3, 3) rotated like a block model's: rows x, y, z in world coordinates.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def rotation_from_angles(bearing: float, plunge: float, dip: float) -> Floats:
     plunge : float
         Slope of the y axis, degrees below the horizontal.
     dip : float
-        Degrees by which the x axis then turns downwards about the y axis.
+        Rotation of the x axis downwards about the y axis, degrees, applied last.
 
     Examples
     --------

@@ -6,8 +6,8 @@ code", 2021 (arXiv 2102.03069): with J the deformation of a tetrahedron from its
 
     |J|^2 / chi(det J)^(2/3) + (1 + det(J)^2) / chi(det J)
 
-is finite for inverted elements as long as eps > 0; it is minimised repeatedly while eps goes
-to zero with the worst determinant, after which no element can invert any more.
+is finite for inverted elements as long as eps > 0.  It is minimised repeatedly, and eps goes to
+zero with the worst determinant; then no element can invert any more.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from geounfold.geometry.mesh import Floats, Ints
 
 _ROUNDS = 10  # values of eps
 _STEPS = 50  # L-BFGS steps for each
-_RINGS = (1, 2, 4)  # neighbourhoods of the bad elements that are freed, one after the other
-_SOUND = 1e-3  # determinant from which an element counts as upright
+_RINGS = (1, 2, 4)  # rings around the bad elements whose vertices may move, tried in order
+_SOUND = 1e-3  # least determinant of an element that counts as upright
 _LEAST = 1e-6  # eps if nothing is inverted
 
 
 def untangle(V: Floats, T: Ints, rest: Floats, bad: Ints) -> Floats:
-    """Return vertices with as few as possible moved, so that no tetrahedron is inverted.
+    """Return vertices, with as few as possible moved, such that no tetrahedron is inverted.
 
     Parameters
     ----------
     V : (n, 3) float
         Vertices.
     T : (m, 4) int
-        Tetrahedra, right-handed where upright.
+        Tetrahedra, right-handed if upright.
     rest : (n, 3) float
-        Vertices of the shapes that elements should have: the other space's.  A tetrahedron
-        that is not upright there has a regular rest shape, of the median volume.
+        Vertices of the rest shapes: those in the other space.  A tetrahedron that is not upright
+        there has a regular rest shape of the median volume.
     bad : (k,) int
-        Vertices of the elements at fault.
+        Vertices of the inverted elements.
 
     Returns
     -------
     (n, 3) float
-        The first neighbourhood's answer that is upright; else the last one's.
+        The answer of the first neighbourhood without inverted elements; else that of the last.
     """
     inverse = _rest_shapes(rest, T)
     free = np.zeros(len(V), dtype=bool)
@@ -80,7 +80,7 @@ def _rest_shapes(rest: Floats, T: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """The elements around the free vertices, and the energy in those vertices' places."""
+    """The elements around the free vertices, and the energy as a function of these vertices."""
 
     V: Floats
     T: Ints
@@ -122,7 +122,7 @@ class _Problem:
         cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         det = np.einsum("ij,ij->i", a, cofactor[:, 0])
         root = np.sqrt(eps * eps + det * det)
-        # The plain formula cancels if det is far below zero.
+        # The direct formula cancels if det is far below zero.
         chi = np.where(det > 0, (det + root) / 2, eps * eps / (2 * (root - det)))
         slope = chi / root
         square = np.einsum("ijk,ijk->i", K, K)

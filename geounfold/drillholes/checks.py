@@ -319,7 +319,8 @@ def dip_positive_down(dip: Floats, stated: bool | None, source: str, log: Log) -
         The dips have both signs and the user states no convention.
     """
     up, down = int(np.count_nonzero(dip < 0)), int(np.count_nonzero(dip > 0))
-    spread = f"{dip.min():g} to {dip.max():g} degrees" if len(dip) else "none"
+    low, high = (f"{d:g}" for d in (dip.min(), dip.max())) if len(dip) else ("", "")
+    spread = f"{low if low == high else f'{low} to {high}'} degrees" if len(dip) else "none"
     if stated is not None:
         if (down if not stated else up) and not (up if not stated else down):
             log.add(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from geounfold.errors import (
@@ -24,6 +25,7 @@ from geounfold.methods.thesis import ThesisOptions
 from geounfold.quality.neighbour_distances import NEIGHBOURS
 from geounfold.surfaces.hull import HULLS, HullOptions
 from geounfold.surfaces.split import SPLITS
+from geounfold.unfolding.gone_options import gone
 
 VALID: dict[str, tuple[str, ...]] = {
     "method": tuple(METHODS),
@@ -80,10 +82,10 @@ class UnfoldOptions:
         Distance from the body, in blocks, up to which other points are carried.
     allow_uncertified : bool
         Whether an answer that is not proved one-to-one is given, marked, and is no error.
-    flattener_options : dataclass or None
+    flattener_options : dataclass, dict or None
         Options of the flattener, such as SpringOptions; None for its defaults.
-    hull_options : HullOptions
-        Options of the hulls.
+    hull_options : HullOptions or dict
+        Options of the hulls. The options of every stage may also be a dict of values by name.
     sheet_options : SheetOptions
         Options of ``sheet``, and of the methods that take its mid surface: all but ``thesis``.
     thesis_options : ThesisOptions
@@ -104,6 +106,8 @@ class UnfoldOptions:
     --------
     >>> UnfoldOptions(datum="top").flattener
     'spring'
+    >>> UnfoldOptions(hull_options={"level": 0.4}).hull_options.level
+    0.4
     """
 
     method: str = "sheet"
@@ -137,6 +141,10 @@ class UnfoldOptions:
         check_whole("neighbours", self.neighbours, 1)
         check_number("reach", self.reach, 0)
         check_flag("allow_uncertified", self.allow_uncertified)
+        for name, kind in (
+            STAGES | {"flattener_options": FLATTENERS[self.flattener].options}
+        ).items():
+            object.__setattr__(self, name, _from_dict(name, getattr(self, name), kind))
         check_flattener_options(self.flattener, self.flattener_options)
         for name, kind in STAGES.items():
             check_options(name, getattr(self, name), kind)
@@ -144,3 +152,34 @@ class UnfoldOptions:
     def as_dict(self) -> dict[str, Any]:
         """Return the options as plain nested dicts."""
         return asdict(self)
+
+
+def check_names(values: Mapping[str, Any], kind: Any, path: tuple[str, ...] = ()) -> None:
+    """Raise OptionError if a name is no field of an options class.
+
+    Parameters
+    ----------
+    values : mapping
+        By the option's name.
+    kind : type
+        The options class.
+    path : tuple of str
+        Names of the options that hold the class, the outermost first.
+    """
+    known = [f.name for f in fields(kind)]
+    for name, value in values.items():
+        if name not in known:
+            full = ".".join((*path, str(name)))
+            inside = f" in {'.'.join(path)}" if path else ""
+            raise OptionError(
+                gone(full, value)
+                or f"there is no option {full}; valid{inside}: {', '.join(known) or 'none'}"
+            )
+
+
+def _from_dict(name: str, value: Any, kind: Any) -> Any:
+    """Return options given as a dict as their class; any other value as it is."""
+    if not isinstance(value, dict):
+        return value
+    check_names(value, kind, (name,))
+    return kind(**value)

@@ -15,8 +15,7 @@ import numpy as np
 from geounfold._version import __version__
 from geounfold.errors import OptionError
 from geounfold.flattening import FLATTENERS
-from geounfold.unfolding.gone_options import gone
-from geounfold.unfolding.options import VALID, UnfoldOptions
+from geounfold.unfolding.options import VALID, UnfoldOptions, check_names
 
 _WIDTH = 96
 _FLATTENER = "flattener_options"  # the one table whose class depends on another option
@@ -189,15 +188,7 @@ def _doc(cls: type) -> str:
 
 def _made(cls: Any, table: dict[str, Any], path: tuple[str, ...]) -> Any:
     """Return a dataclass made of a TOML table; the dataclass checks the values."""
-    known = [field.name for field in fields(cls)]
-    for name, value in table.items():
-        if name not in known:
-            full = ".".join((*path, name))
-            inside = f" in {'.'.join(path)}" if path else ""
-            raise OptionError(
-                gone(full, value)
-                or f"there is no option {full}; valid{inside}: {', '.join(known) or 'none'}"
-            )
+    check_names(table, cls, path)
     kinds = dict(get_type_hints(cls))
     flattener = table.get("flattener", UnfoldOptions.flattener)
     if cls is UnfoldOptions and isinstance(flattener, str) and flattener in FLATTENERS:

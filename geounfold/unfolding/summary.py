@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from geounfold._version import __version__
 from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.backends.memory import peak_memory_mb
@@ -13,7 +15,8 @@ from geounfold.body.check import count_duplicates
 from geounfold.body.prepare import PreparedPoints
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
-from geounfold.geometry.mesh import Floats
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.messages import counted
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.prism_coordinates import PrismInterpolant
 from geounfold.methods import BodyFit, PointwiseMap, SurfacePair
@@ -124,11 +127,11 @@ def warnings_of(run: RunRecord) -> list[str]:
     duplicates = count_duplicates(run.prepared.points)
     if duplicates:
         out.append(f"{duplicates} points repeat the coordinates of another; all were kept")
-    apart = len(run.prepared.points) - run.prepared.chosen
-    if apart:
+    apart = _apart(run)
+    if len(apart):
         out.append(
-            f"{apart} points are not part of the unfolded body; they were carried where its "
-            "map reaches them"
+            f"{counted(len(apart), 'point is', 'points are')} not part of the unfolded body, "
+            f"{_first_place(run, apart)}; the map carries what it reaches"
         )
     count, outside, empty = len(run.prepared.points), run.outside, run.empty
     if outside > empty:
@@ -139,7 +142,9 @@ def warnings_of(run: RunRecord) -> list[str]:
     if empty:
         out.append(
             f"{empty} of {count} points lie farther from the control mesh than the "
-            f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}); they were left empty"
+            f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}), "
+            f"{_first_place(run, np.flatnonzero(~run.measured.carried.placed))}; they were left "
+            "empty and are marked outside"
         )
     if len(run.measured.torn):
         out.append(f"{len(run.measured.torn)} blocks were torn from their neighbours")
@@ -149,6 +154,20 @@ def warnings_of(run: RunRecord) -> list[str]:
     if run.lost:
         out.append(f"{run.lost} points were not brought back by the map")
     return out
+
+
+def _apart(run: RunRecord) -> Ints:
+    """Return the rows of the points that are in none of the bodies to unfold."""
+    rest = np.ones(len(run.prepared.points), dtype=bool)
+    for group in run.prepared.groups:
+        rest[group] = False
+    return np.flatnonzero(rest)
+
+
+def _first_place(run: RunRecord, rows: Ints) -> str:
+    """Return words that name the coordinates of the first of some points."""
+    place = ", ".join(f"{c:.10g}" for c in run.prepared.points[rows[0]])
+    return f"{'at' if len(rows) == 1 else 'the first at'} ({place})"
 
 
 def _lattice(run: RunRecord) -> dict[str, Any]:

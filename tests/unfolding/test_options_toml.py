@@ -91,6 +91,24 @@ def test_what_is_left_out_has_its_default() -> None:
     )
 
 
+def test_a_dict_makes_the_options_of_a_stage() -> None:
+    made = UnfoldOptions(
+        flattener="arap",
+        flattener_options={"tol": 1e-3},
+        hull_options={"level": 0.4},  # type: ignore[arg-type]
+    )
+    assert made.flattener_options == ArapOptions(tol=1e-3)
+    assert made.hull_options == HullOptions(level=0.4)
+    for wrong, words in (
+        ({"lvel": 0.4}, "no option hull_options.lvel; valid in hull_options: level, blur, edge,"),
+        ({"level": 2}, "hull_options.level must be a number between 0 and 1, but is 2"),
+        ({"sigma": 1}, "hull_options.sigma is called hull_options.blur since 0.2.0"),
+        (3, "hull_options must be HullOptions, but is 3"),
+    ):
+        with pytest.raises(OptionError, match=words):
+            UnfoldOptions(hull_options=wrong)  # type: ignore[arg-type]
+
+
 def test_numpy_values_and_odd_texts_are_written() -> None:
     options = UnfoldOptions(up=np.array([0, 0, 2]), neighbours=np.int64(5))  # type: ignore[arg-type]
     read = tomllib.loads(to_toml(options))

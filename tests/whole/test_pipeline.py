@@ -1,6 +1,7 @@
 """The whole unfolding: truths, invariances, datums, bodies, reference surfaces, errors."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -165,6 +166,9 @@ def test_several_bodies(swelling):
     one = gu.unfold(both, body=0)
     assert (one.location[: len(swelling)] == "inside").all()
     assert any("not part of the unfolded body" in w for w in one.summary()["warnings"])
+    x, y, z = other[0]
+    place = rf"{len(other)} points are not part .*, the first at \({x:.10g}, {y:.10g}, {z:.10g}\)"
+    assert any(re.match(place, w) for w in one.summary()["warnings"])
     every = gu.unfold(both, body="all")
     assert every.outside_share == 0
     assert every.round_trip_max < 1e-9 * size(both)

@@ -50,6 +50,7 @@ class Console:
         self._quiet, self._json, self._plain = quiet, json, plain
         self._live = not quiet and self._stream is not None and self._stream.isatty()
         self._shown = False
+        self._warned: set[str] = set()
         self._forecast = Forecast()
 
     @cached_property
@@ -69,8 +70,9 @@ class Console:
             self._write(f"{_one_line(text)} ({self._forecast.elapsed:.1f} s)\n")
 
     def warn(self, text: str) -> None:
-        """Say what to distrust; in a pipe too, unless quiet."""
-        if not self._quiet:
+        """Print a warning, in a pipe too, unless quiet; the same words once only."""
+        if not self._quiet and text not in self._warned:
+            self._warned.add(text)
             self._clear()
             self._write(f"geounfold: warning: {_one_line(text)}\n")
 

@@ -15,7 +15,7 @@ from geounfold.errors import InputError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
-from geounfold.io.messages import counted, rows_named
+from geounfold.io.messages import counted, listing, rows_named, shown
 from geounfold.io.tables.files import check_writable, read_table, with_columns, write_table
 
 Place = Callable[[Floats], Floats]
@@ -71,7 +71,10 @@ class PointTable:
         where = np.flatnonzero(self.frame.columns == column)
         if len(where) != 1:
             what = "no" if not len(where) else "more than one"
-            raise InputError(f"{self.source}: {what} column '{column}'")
+            raise InputError(
+                f"{self.source}: {what} column '{shown(column)}'; the file has: "
+                f"{listing(self.frame.columns)}"
+            )
         return numbers(self.frame.iloc[:, int(where[0])], source=self.source)
 
     def with_columns(self, columns: dict[str, Any]) -> pd.DataFrame:

@@ -198,10 +198,10 @@ def test_damaged_surfaces_are_one_line(name: str, content: bytes, tmp_path: Path
 
 def test_unknown_endings(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="unknown kind of surface"):
-        write_surface(tmp_path / "s.xyz", tetrahedron())
-    (tmp_path / "p.xyz").write_text("1 2 3")
-    with pytest.raises(InputError, match=r"unknown kind of table '.xyz'.*\.gslib"):
-        read_points(tmp_path / "p.xyz")
+        write_surface(tmp_path / "s.unknown", tetrahedron())
+    (tmp_path / "p.unknown").write_text("1 2 3")
+    with pytest.raises(InputError, match=r"unknown kind of table '.unknown'.*\.gslib"):
+        read_points(tmp_path / "p.unknown")
 
 
 def test_several_objects_of_different_systems(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""How blocks are drawn: which lie outside, which are drawn at all, and what shape they take."""
+"""Drawing of blocks: which lie outside, which are drawn, and their shapes."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from geounfold.report.columns import read_columns
 from geounfold.report.plots.rendering import block_sides
 
 LIMIT = 50_000
-"""Blocks that a report holds at most."""
+"""Largest number of blocks in a report."""
 
 _SEED = 20_261_124
-_MAX_CELLS = 30_000_000  # of the grid that inner blocks are found with: 30 MB
-_INSIDE_SHARE = 0.2  # of the blocks drawn at least, so that slices of large bodies are not empty
-_LOOSE = 0.001  # how much a gradient is held to a rotation, which sheets of one block need
-_SPARSE = 1.3  # typical spacing over the lattice's step from which blocks are larger than steps
-_FINEST = 8  # sub-blocks along a side that are told apart
-_LEVEL = 1e-3  # slope of axes that are drawn as level
-_TORN = 2.5  # neighbours that move apart by this factor are none
+_MAX_CELLS = 30_000_000  # largest grid in which inner blocks are found: 30 MB
+_INSIDE_SHARE = 0.2  # least share of inner blocks drawn, so that slices are not empty
+_LOOSE = 0.001  # weight that draws a gradient to a rotation, needed for sheets of one block
+_SPARSE = 1.3  # ratio of typical spacing to lattice step above which blocks are larger than steps
+_FINEST = 8  # largest number of sub-blocks along a side
+_LEVEL = 1e-3  # largest slope of axes that are drawn as level
+_TORN = 2.5  # points that move apart by this factor are no longer neighbours
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """The boxes that blocks are drawn as, in the folded space.
+    """Boxes drawn for the blocks, in the folded space.
 
     Attributes
     ----------
     axes : (3, 3) float
         Unit directions of the boxes' edges, as rows.
     sides : (3,) float
-        Their lengths along these, where blocks are alike; else of the smallest.
+        Lengths along the axes if all blocks are alike; else those of the smallest block.
     sizes : (n, 3) float or None
-        Every block's lengths, where they differ.
+        Lengths of every block if they differ.
     """
 
     axes: Floats
@@ -49,15 +49,15 @@ class Shape:
 
 
 def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | None:
-    """Return how blocks lie in the folded space; None of points that are on no lattice.
+    """Return the boxes of blocks in the folded space; None for points on no lattice.
 
     Parameters
     ----------
     points : (n, 3) float
         Centroids.
     columns : mapping of str to (n,)
-        Where they hold one set of sides (``XINC``, ``dim_x`` ...: see `size_columns`), all above 0,
-        these are the blocks' along the lattice's axes.
+        If they include one set of sides (``XINC``, ``dim_x`` ...: `size_columns`), all above 0,
+        these are the sides of the blocks along the lattice's axes.
 
     Examples
     --------
@@ -76,17 +76,17 @@ def block_shape(points: Floats, columns: Mapping[str, ArrayLike]) -> Shape | Non
 
 
 def level_sides(shape: Shape | None) -> Floats | None:
-    """Return every block's sides along the world's axes, (n, 3); None where they do not lie so."""
+    """Return every block's sides along the world's axes, (n, 3); None if blocks are rotated."""
     if shape is None or not np.allclose(shape.axes, np.eye(3), rtol=0, atol=_LEVEL):
         return None
     return shape.sizes
 
 
 def _sizes(columns: Mapping[str, ArrayLike], count: int) -> Floats | None:
-    """Return the sides of blocks that stand in a table, (n, 3); None where they do not."""
+    """Return the sides of blocks from a table's columns, (n, 3); None if there are none."""
     try:
         names = size_columns([str(name) for name in columns])
-    except InputError:  # several sets of sides: none is known to be the blocks'
+    except InputError:  # several sets of sides: it is not known which are the blocks'
         return None
     if names is None:
         return None
@@ -98,20 +98,20 @@ def _sizes(columns: Mapping[str, ArrayLike], count: int) -> Floats | None:
 
 
 def outer_blocks(points: Floats, shape: Shape | None) -> Bools:
-    """Return which blocks can be seen from outside: all but those with blocks on every side.
+    """Return which blocks are visible from outside: all except those with blocks on every side.
 
     Parameters
     ----------
     points : (n, 3) float
         Centroids in the folded space.
     shape : Shape or None
-        See `block_shape`.
+        Boxes of the blocks (`block_shape`).
 
     Returns
     -------
     (n,) bool
-        On lattices the outermost layer.  Elsewhere counted on a grid of the blocks' size, whose
-        holes are closed, and two layers deep, so that no gaps show.
+        On lattices the outermost layer.  Elsewhere the two outermost layers on a grid of the
+        blocks' size with closed holes, so that no gaps appear.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def outer_blocks(points: Floats, shape: Shape | None) -> Bools:
 
 
 def _cells(points: Floats, shape: Shape | None) -> tuple[Ints, Ints]:
-    """Return the cells that blocks fill, (m, 3), none below 3, and the block that fills each."""
+    """Return the cells filled by blocks, (m, 3), indices from 3, and the block that fills each."""
     axes, sides = (np.eye(3), block_sides(points)) if shape is None else (shape.axes, shape.sides)
     sizes = sides if shape is None or shape.sizes is None else shape.sizes
     corner = points @ axes.T - sizes / 2
@@ -157,9 +157,9 @@ def chosen_blocks(outer: Bools, limit: int = LIMIT) -> Ints:
     Parameters
     ----------
     outer : (n,) bool
-        Which blocks can be seen from outside.
+        Which blocks are visible from outside.
     limit : int, optional
-        How many are drawn at most.
+        Largest number of blocks drawn.
 
     Examples
     --------
@@ -176,20 +176,20 @@ def chosen_blocks(outer: Bools, limit: int = LIMIT) -> Ints:
 
 
 def gradients(here: Floats, there: Floats, neighbours: Ints, chosen: Ints) -> Floats:
-    """Return how the surroundings of blocks are turned and stretched, (k, 3, 3).
+    """Return the deformation gradients around blocks, (k, 3, 3).
 
-    The matrix F that fits ``dy = F dx`` best over the neighbours, dx from the block to a neighbour
-    in the one space and dy in the other.  Where the neighbours lie in a plane or a line, the rest
-    of F is the nearest rotation's (Kabsch 1976).
+    The matrix F best fits ``dy = F dx`` over the neighbours, dx from the block to a neighbour in
+    the first space and dy in the second.  If the neighbours lie in a plane or on a line, the rest
+    of F is that of the nearest rotation (Kabsch 1976).
 
     Parameters
     ----------
     here, there : (n, 3) float
-        All blocks in the one space and in the other.
+        All blocks in the first and in the second space.
     neighbours : (n, m) int
         Rows of each block's neighbours.
     chosen : (k,) int
-        The blocks whose matrices are wanted.
+        Rows of the blocks whose matrices are returned.
     """
     ids = neighbours[chosen]
     dx = here[ids] - here[chosen, None]

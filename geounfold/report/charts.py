@@ -1,4 +1,4 @@
-"""Distributions as SVG that follows the page's colours: violin, histogram, cumulative curve."""
+"""Distributions as SVG in the page's colours: violin, histogram, cumulative curve."""
 
 from __future__ import annotations
 
@@ -17,27 +17,29 @@ from geounfold.report.plots.figures import colour_limits
 _WIDTH, _HEIGHT = 400, 250
 _LEFT, _RIGHT, _TOP, _BOTTOM = 54, 14, 12, 46
 _BINS = 60
-_FINE = 512  # bins that the violin's density is counted in
+_FINE = 512  # bins of the violin's density
 _CURVE = 400  # points of the cumulative curve
 _QUANTILES = (0.5, 0.9, 0.95)
+_DIGITS = 12  # most digits of a number; smaller differences are rounding
+_LETTER = 7.0  # width of a digit at the page's 12 px, so that no label leaves the picture
 
 
 def distribution(values: Floats, label: str) -> str:
     """Return violin, histogram and cumulative curve of one column (thesis, figures 3.16 and 4.5).
 
-    Each is an SVG with a text for those who do not see it.
+    Each is an SVG with a text alternative.
 
     Parameters
     ----------
     values : (n,) float
-        One per block.
+        One value per block.
     label : str
-        What they are.
+        Name of the values, shown on the axis.
 
     Raises
     ------
     InputError
-        No values, or some that are not finite.
+        There are no values, or some are not finite.
     """
     v = np.ravel(np.asarray(values, dtype=np.float64))
     if not v.size or not np.isfinite(v).all():
@@ -47,7 +49,7 @@ def distribution(values: Floats, label: str) -> str:
 
 
 def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
-    """Return round numbers from `low` to `high`, `most` at most, at steps of 1, 2 or 5.
+    """Return at most `most` round numbers from `low` to `high`, in steps of 1, 2 or 5.
 
     Examples
     --------
@@ -66,7 +68,7 @@ def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
 
 @dataclass(frozen=True)
 class _Axes:
-    """Where values of a chart lie in its picture."""
+    """Axes of a chart: values to picture coordinates."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -91,9 +93,10 @@ class _Axes:
             parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{right}"/>')
             parts.append(f'<text x="{_LEFT - 6}" y="{y + 4:.1f}" class="end">{_tick(tick)}</text>')
         for tick in nice_ticks(*self.x):
-            x = self.px(tick)
+            x, label = self.px(tick), _tick(tick)
             parts.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{base}"/>')
-            parts.append(f'<text x="{x:.1f}" y="{base + 16}" class="mid">{_tick(tick)}</text>')
+            x = min(x, _WIDTH - _LETTER * len(label) / 2)
+            parts.append(f'<text x="{x:.1f}" y="{base + 16}" class="mid">{label}</text>')
         parts.append(f'<path class="axis" d="M{_LEFT} {base}H{right}"/>')
         middle = (_LEFT + right) / 2
         parts.append(f'<text x="{middle}" y="{_HEIGHT - 10}" class="mid">{text(xlabel)}</text>')
@@ -117,16 +120,31 @@ def _svg(title: str, told: str, content: str) -> str:
 
 
 def _limits(v: Floats) -> tuple[float, float]:
-    """Return the 1st and 99th percentile, with room around; never one and the same."""
+    """Return the limits of an axis: 1st and 99th percentile, spread if equal; 0 if that is near."""
     low, high = colour_limits(v)
     if v.min() >= 0 and low < 0.25 * high:
         low = 0.0
     return low, high
 
 
+def significant(*values: float) -> list[str]:
+    """Return numbers with four significant digits, or more if their span is small beside them.
+
+    Examples
+    --------
+    >>> significant(0.1234567, 12.0), significant(0.99999912, 1.0000008)
+    (['0.1235', '12'], ['0.99999912', '1.0000008'])
+    """
+    span, largest = max(values) - min(values), max(map(abs, values))
+    digits = 4
+    if span > 0:
+        digits = max(4, 2 + math.floor(math.log10(largest)) - math.floor(math.log10(span)))
+    return [f"{value:.{min(digits, _DIGITS)}g}" for value in values]
+
+
 def _quartiles(v: Floats) -> str:
-    q1, q2, q3 = np.quantile(v, [0.25, 0.5, 0.75])
-    return f"Median {q2:.4g}, middle half {q1:.4g} to {q3:.4g}"
+    q1, q2, q3 = significant(*np.quantile(v, [0.25, 0.5, 0.75]).tolist())
+    return f"Median {q2}, middle half {q1} to {q3}"
 
 
 def _violin(v: Floats, label: str) -> str:
@@ -162,9 +180,10 @@ def _histogram(v: Floats, label: str) -> str:
         if n
     )
     content = axes.frame(label, "blocks", nice_ticks(*axes.y, most=5))
+    least, most = significant(float(v.min()), float(v.max()))
     told = (
-        f"Histogram: {len(v):,} blocks from {v.min():.4g} to {v.max():.4g}; what lies beyond the "
-        "1st and 99th percentile is in the end bars."
+        f"Histogram: {len(v):,} blocks from {least} to {most}; the end bars include values beyond "
+        "the 1st and 99th percentile."
     )
     return _svg(f"Histogram of {label}", told, f'{content}<path class="bars" d="{bars}"/>')
 
@@ -178,8 +197,9 @@ def _cumulative(v: Floats, label: str) -> str:
     content = axes.frame(label, "share of blocks", [0.0, 0.25, 0.5, 0.75, 1.0])
     content += f'<path class="line" d="M{axes.path(at, share)}"/>'
     notes = []
-    for q, x in zip(_QUANTILES, np.quantile(v, _QUANTILES), strict=True):
+    quantiles = np.quantile(v, _QUANTILES).tolist()
+    for q, x, word in zip(_QUANTILES, quantiles, significant(*quantiles), strict=True):
         place = float(np.clip(x, low, high))
         content += f'<circle class="dot" r="4" cx="{axes.px(place):.1f}" cy="{axes.py(q):.1f}"/>'
-        notes.append(f"{q:.0%} at or below {x:.4g}")
+        notes.append(f"{q:.0%} at or below {word}")
     return _svg(f"Cumulative share of {label}", f"Cumulative: {', '.join(notes)}.", content)

@@ -1,4 +1,4 @@
-"""Exploratory data analysis of one grade: figures with words for them, and their tables."""
+"""Exploratory data analysis of one grade: figures with captions, and their tables."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def exploration_html(exploration: Exploration) -> str:
     Parameters
     ----------
     exploration : Exploration
-        Of samples that were carried with the body.
+        Exploration of samples that were carried with the body.
     """
     from geounfold.estimation.exploration import statistics
     from geounfold.report.plots.grades import charts
@@ -57,7 +57,7 @@ def exploration_html(exploration: Exploration) -> str:
 
 
 def _samples(exploration: Exploration) -> str:
-    """Return how many samples count, and why others do not."""
+    """Return a sentence on the samples used, and on why others are not."""
     facts = exploration.samples.facts()
     used, given = facts["used"], facts["given"]
     if used == given:
@@ -69,7 +69,7 @@ def _samples(exploration: Exploration) -> str:
 
 
 def _told(exploration: Exploration) -> dict[str, str]:
-    """Return what each figure shows, in words."""
+    """Return the caption of each figure, in words."""
     e, grade, v = exploration, exploration.grade, exploration.samples.grades
     models = "; ".join(f"{space}: {_ranges(m)}" for space, m in e.models.items())
     swaths = "; ".join(f"along {name} {_spread(t)}" for name, t in e.swaths.items())
@@ -106,7 +106,7 @@ def _spread(profile: pd.DataFrame) -> str:
 
 
 def _sides(profile: pd.DataFrame) -> str:
-    """Return the mean within reach on either side of a contact."""
+    """Return the mean grade on either side of a contact, as a phrase."""
     said = []
     for side, some in (("inside", profile["low"] >= 0), ("outside", profile["low"] < 0)):
         count = profile.loc[some, "count"].to_numpy()
@@ -118,7 +118,7 @@ def _sides(profile: pd.DataFrame) -> str:
 
 
 def _row(values: Mapping[Any, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """Return some of the values, a dash for what is no number."""
+    """Return the named values; a dash for those that are no number."""
     return {n: "–" if values[n] != values[n] else values[n] for n in names}
 
 

@@ -1,4 +1,4 @@
-"""What a summary says, in plain words: sound or not, what was checked, what to distrust."""
+"""The verdict on an unfolding in plain words: sound or not, what was checked, what to distrust."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from typing import Any
 
 from geounfold.report.html_text import mapping, number
 
-_CARE = 0.001  # share of blocks outside the control mesh from which the verdict asks for care
+_CARE = 0.001  # share of blocks outside the control mesh from which the verdict is care
 _BENT = 0.1  # change of neighbour distances that the thesis counts as an error (section 3.5)
-_SWOLLEN = 0.05  # change of volume that is worth telling before tonnages are taken
+_SWOLLEN = 0.05  # change of volume above which tonnages need a weight
 _STRETCHED = 0.005  # edge strain of a flattened surface above which it is not developable
 
 _RUNGS = {
-    "capped": "offsets from the mid surface were capped where the fold is tighter than half the "
+    "capped": "the height of the control mesh was limited where the fold is tighter than half the "
     "thickness",
-    "blended": "offsets from the mid surface fall back around places where normals cross",
-    "refined": "only finer cells and layers could follow the fold",
+    "blended": "the height of the control mesh was reduced where normals of the mid surface cross",
+    "refined": "the control mesh needed finer cells and layers to follow the fold",
     "untangled": "some vertices of the control mesh were moved to turn inverted tetrahedra upright",
-    "shrunk": "the control mesh was drawn in towards the mid surface until nothing was inverted",
+    "shrunk": "the height of the control mesh was reduced until no tetrahedron was inverted",
 }
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a summary says, in words.
+    """The verdict on an unfolding, in words.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Verdict:
     headline : str
         One sentence.
     reasons : tuple of str
-        One sentence per thing that was checked.
+        One sentence for each check.
     distrust : tuple of str
-        One sentence per thing that a user should look at before relying on the result.
+        One sentence for each thing to look at before relying on the result.
     """
 
     level: str
@@ -46,7 +46,7 @@ class Verdict:
 
 
 def verdict(summary: Mapping[str, Any]) -> Verdict:
-    """Return a plain verdict on an unfolding from its summary; what is absent is not judged.
+    """Return a plain verdict on an unfolding from its summary; missing figures are not judged.
 
     Examples
     --------
@@ -65,20 +65,20 @@ def _headline(summary: Mapping[str, Any]) -> tuple[str, str]:
     if proved is False and mapping(summary.get("certificate")).get("injective") is True:
         return (
             "care",
-            "Usable: the tetrahedra are one to one; between their corners it is not proved.",
+            "Usable: the tetrahedra are one-to-one; inside the prisms nothing is proved.",
         )
     if proved is False:
-        return "bad", "The map is not proved one to one: do not use it as it is."
+        return "bad", "The map is not proved one-to-one: do not use it as it is."
     if None in inverted:
         return "care", "It is not known whether the map folds over itself."
     if outside is not None and outside > _CARE:
         return "care", f"Usable with care: {outside:.2%} of the blocks were extrapolated."
     if summary.get("torn"):
         blocks = _count(summary["torn"], "block")
-        return "care", f"Usable with care: {blocks} parted from blocks that they touch."
+        return "care", f"Usable with care: {blocks} moved away from blocks that they touched."
     if proved is not True:
-        return "care", "Usable: nothing is inverted. That it is one to one is not proved."
-    return "good", "Sound: the map is proved to be one to one."
+        return "care", "Usable: no tetrahedron is inverted, but the map is not proved one-to-one."
+    return "good", "Sound: the map is proved one-to-one."
 
 
 def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
@@ -90,13 +90,14 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
         yield (
             f"Proved: {number(certificate['tetrahedra'])} tetrahedra, none inverted, and "
             f"{number(certificate['boundary_faces'])} border faces, none crossing, in both spaces, "
-            "by exact predicates; so their map is one to one (Lipman 2014)."
+            "by exact predicates; so their map is one-to-one (Lipman 2014)."
         )
         used = mapping(summary.get("coordinates")).get("name", "tet")
         if used != "tet":
             yield (
-                f"Not proved: inside the prisms points go by {used} coordinates of their corners, "
-                "not by the tetrahedra's; the blocks were there and back, and none inside out."
+                f"Not proved: inside the prisms, points are carried by {used} coordinates of the "
+                "corners, not by the tetrahedra. Checked at the blocks only: every block returns, "
+                "and none is turned inside out."
             )
     elif certificate.get("reason"):
         yield f"Not proved: {certificate['reason']}."
@@ -104,7 +105,7 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
         yield (
             f"Not proved: {number(certificate['crossing_folded'])} pairs of border faces cross in "
             f"the folded space, {number(certificate['crossing_unfolded'])} in the unfolded one; "
-            f"{number(certificate['blocks_in_faulty_elements'])} blocks lie in elements at fault "
+            f"{number(certificate['blocks_in_faulty_elements'])} blocks lie in tetrahedra at fault "
             "(listed below, and marked in the mesh that --mesh writes)."
         )
     empty = mapping(summary.get("outside")).get("empty")
@@ -116,16 +117,16 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"The control mesh holds {share}."
     if summary.get("round_trip_max") is not None:
         yield (
-            "There and back through the map, blocks inside move by at most "
+            "Blocks inside, carried to the flat space and back, move by at most "
             f"{number(summary['round_trip_max'])} (input's unit)."
         )
     error = summary.get("nmd")
     if isinstance(error, Mapping) and "mean" in error:
         yield (
             f"Neighbour mean distances change by {error['mean']:.2%} on average, "
-            f"{error.get('p95', float('nan')):.2%} at the 95th percentile. This measure hardly "
-            "sees folds: leaving the body as it is would score 0, and a right unfolding changes "
-            "it where layers slid over one another."
+            f"{error.get('p95', float('nan')):.2%} at the 95th percentile. This measure "
+            "hardly depends on folds: the folded body itself scores 0, and a correct unfolding "
+            "changes it where layers slipped over one another."
         )
 
 
@@ -135,20 +136,20 @@ def _distrust(summary: Mapping[str, Any]) -> Iterator[str]:
     yield from _holes_to_distrust(mapping(summary.get("drillholes")))
     if summary:
         yield (
-            "The proof says that nothing overlaps and everything comes back, not that the geology "
-            "is right. Faults, and limbs less than a block apart, are not seen: check the layers "
-            "against known horizons before variograms rely on them."
+            "A proved map does not overlap and has an inverse; the geology may still be wrong. "
+            "Faults, and limbs less than a block apart, are not detected: check the layers against "
+            "known horizons before you compute variograms."
         )
 
 
 def _places_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what concerns single blocks."""
+    """Yield sentences about single blocks."""
     certificate = mapping(summary.get("certificate"))
     faulty = certificate.get("blocks_in_faulty_elements")
     if faulty:
         yield (
-            f"{_count(faulty, 'block')} in elements at fault: their coordinates may belong to two "
-            "places. Leave them out, or unfold the body without the part around them."
+            f"{_count(faulty, 'block')} in tetrahedra at fault: their coordinates may belong to "
+            "two places. Leave them out, or unfold the body without the part around them."
         )
     outside = mapping(summary.get("outside"))
     if outside.get("extrapolated"):
@@ -162,7 +163,7 @@ def _places_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
     if summary.get("torn"):
         yield (
             f"{_count(summary['torn'], 'block')} torn from a block that it touched: pairs across "
-            "such a tear are no neighbours any more. Colour by nmd_error to find them."
+            "such a tear are no longer neighbours. Colour by nmd_error to find them."
         )
     given = mapping(summary.get("input"))
     if given.get("dropped_invalid"):
@@ -170,31 +171,31 @@ def _places_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _shapes_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what concerns the body as a whole."""
+    """Yield sentences about the whole body."""
     error = mapping(summary.get("nmd"))
     if error.get("p95", 0.0) > _BENT:
         yield (
             f"Distances between neighbours change by more than {_BENT:.0%} for over one block in "
-            f"twenty (at most {error['max']:.0%}). Slip between layers does that as well as "
-            "distortion: compare nmd_error with shear in the pictures; where only the first is "
-            "high, ranges of variograms are off."
+            f"twenty (at most {error['max']:.0%}). Both slip between layers and distortion cause "
+            "this: compare nmd_error with shear in the pictures. Where only nmd_error is high, "
+            "ranges of variograms are wrong."
         )
     volume = mapping(summary.get("volume_change"))
     if volume.get("p95", 0.0) > _SWOLLEN:
         yield (
             f"Volumes change by more than {_SWOLLEN:.0%} for over one block in twenty: weight by "
-            "volume_ratio, or take tonnages in the folded space."
+            "volume_ratio, or compute tonnages in the folded space."
         )
     yield from _strained(mapping(summary.get("flattening")))
     method = mapping(summary.get("method"))
     rung = method.get("rung")
     if isinstance(rung, str) and rung != "constant":
-        what = _RUNGS.get(rung, f"the control mesh had to be mended (rung '{rung}')")
+        what = _RUNGS.get(rung, f"the control mesh had to be repaired (rung '{rung}')")
         yield f"{what[0].upper()}{what[1:]}: layers near there follow the fold less exactly."
     if isinstance(summary.get("bodies"), int) and summary["bodies"] > 1:
         yield (
-            f"{summary['bodies']} bodies were unfolded one by one: distances from one to another "
-            "mean nothing; figures about surfaces are the largest body's."
+            f"{summary['bodies']} bodies were unfolded one by one: distances between bodies have "
+            "no meaning, and figures about surfaces are those of the largest body."
         )
 
 
@@ -203,8 +204,8 @@ def _strained(flattening: Mapping[str, Any]) -> Iterator[str]:
         strain = _last(mapping(how).get("edge_strain"))
         if name == "mid" and strain is not None and strain > _STRETCHED:
             yield (
-                "The mid surface is curved both ways, so that no flat image keeps all its lengths: "
-                f"they change by {strain:.1%} (root mean square over its edges)."
+                "The mid surface is curved in two directions, so no flat image keeps all its "
+                f"lengths: they change by {strain:.1%} (root mean square over its edges)."
             )
         faults = [
             f"{mapping(how)[key]} {key}" for key in ("flips", "overlaps") if mapping(how).get(key)
@@ -213,7 +214,7 @@ def _strained(flattening: Mapping[str, Any]) -> Iterator[str]:
             yield f"The flat {name} surface has {' and '.join(faults)}: see Flattened surfaces."
         stop = mapping(how).get("stop")
         if stop in ("max_iter", "stalled"):
-            yield f"Flattening the {name} surface stopped before it had settled ({stop})."
+            yield f"Flattening the {name} surface stopped before it converged ({stop})."
 
 
 def _holes_to_distrust(holes: Mapping[str, Any]) -> Iterator[str]:
@@ -224,12 +225,12 @@ def _holes_to_distrust(holes: Mapping[str, Any]) -> Iterator[str]:
             f"Of {number(found['points'])} points of the drill-holes' {name}, "
             f"{number(found.get('extrapolated', 0))} lie outside the control mesh (marked "
             f"extrapolated) and {number(found.get('outside', 0))} beyond the map's reach (no flat "
-            "image): the farther out, the less they mean."
+            "image). The farther out, the less reliable they are."
         )
     errors = [f for f in _records(holes.get("findings")) if f.get("severity") not in (None, "note")]
     if errors:
         rows = sum(int(f.get("count", 0)) for f in errors)
-        yield f"{_count(rows, 'row')} of the drill-hole tables could not be used as they are."
+        yield f"{_count(rows, 'row')} of the drill-hole tables could not be used unchanged."
 
 
 def _records(value: object) -> Iterable[Mapping[str, Any]]:
@@ -237,7 +238,7 @@ def _records(value: object) -> Iterable[Mapping[str, Any]]:
 
 
 def _last(value: object) -> float | None:
-    """Return the last of several numbers, or the only one; None where there is none."""
+    """Return the last of several numbers, or the only one; None if there is none."""
     if isinstance(value, list | tuple):
         value = value[-1] if value else None
     return float(value) if isinstance(value, int | float) else None

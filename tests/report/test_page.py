@@ -166,12 +166,12 @@ def test_elements_at_fault_are_listed_with_their_places():
         ({"volume_change": {"p95": 0.06}}, "weight by volume_ratio"),
         ({"flattening": {"mid": {"edge_strain": [0.02]}}}, "change by 2.0%"),
         ({"flattening": {"top": {"flips": 4, "overlaps": 1}}}, "4 flips and 1 overlaps"),
-        ({"flattening": {"mid": {"stop": "max_iter"}}}, "before it had settled (max_iter)"),
-        ({"method": {"rung": "capped"}}, "Offsets from the mid surface were capped"),
+        ({"flattening": {"mid": {"stop": "max_iter"}}}, "before it converged (max_iter)"),
+        ({"method": {"rung": "capped"}}, "The height of the control mesh was limited"),
         ({"method": {"rung": "new"}}, "(rung 'new')"),
         ({"bodies": 2}, "2 bodies were unfolded one by one"),
         ({"input": {"dropped_invalid": 5}}, "5 rows of the input left out"),
-        ({"certificate": {"blocks_in_faulty_elements": 8}}, "8 blocks in elements at fault"),
+        ({"certificate": {"blocks_in_faulty_elements": 8}}, "8 blocks in tetrahedra at fault"),
         (
             {"drillholes": {"samples": {"points": 9, "extrapolated": 4, "outside": 1}}},
             "Of 9 points of the drill-holes' samples, 4 lie outside",
@@ -213,7 +213,7 @@ def test_a_cross_check_of_meshes_is_told_where_there_was_one():
 
 
 def test_the_verdict_says_what_the_measure_hides():
-    assert any("would score 0" in reason for reason in verdict(SUMMARY).reasons)
+    assert any("the folded body itself scores 0" in reason for reason in verdict(SUMMARY).reasons)
 
 
 @pytest.mark.parametrize(

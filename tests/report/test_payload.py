@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 
 import numpy as np
 import pytest
@@ -354,8 +355,16 @@ def test_charts_say_in_words_what_they_show():
     assert "50% at or below 0.5005, 90% at or below 0.9001" in page
     assert "1,000 blocks from 0.001 to 1" in page
     assert "NaN" not in distribution(np.full(9, 2.5), "alike")
+    assert "from 0.99999912 to 1.0000008" in distribution(np.array([0.99999912, 1.0000008]), "x")
     with pytest.raises(InputError, match="x: needs finite values"):
         distribution(np.array([np.nan]), "x")
+
+
+def test_no_label_of_an_axis_leaves_the_picture():
+    page = distribution(np.linspace(0.0, 0.0005 / 0.99, 1000), "x")
+    labels = re.findall(r'<text x="([0-9.]+)" y="220" class="mid">([^<]+)</text>', page)
+    assert labels[5][1] == "0.0005"  # at the very end: the limit is the 99th percentile
+    assert all(float(x) + 3.5 * len(name) <= 400 for x, name in labels)
 
 
 def test_sides_follow_the_space_that_is_drawn_as_boxes():

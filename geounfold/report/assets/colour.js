@@ -120,6 +120,20 @@ function swatches(column, palettes) {
   return list;
 }
 
+// Both ends of a range: four significant digits, or more if its span is small beside them.
+function ends(low, high) {
+  const power = (x) => Math.floor(Math.log10(x));
+  const largest = Math.max(Math.abs(low), Math.abs(high));
+  const digits = high > low
+    ? Math.min(12, Math.max(4, 2 + power(largest) - power(high - low))) : 4;
+  const short = (x) => {
+    const size = Math.abs(x);
+    if (size !== 0 && (size >= 1e9 || size < 1e-4)) return x.toExponential(digits - 1);
+    return x.toLocaleString("en", { maximumSignificantDigits: digits });
+  };
+  return `${short(low)} to ${short(high)}`;
+}
+
 function barOf(scale, whole) {
   const bar = element("div", undefined, "bar");
   const stops = [];
@@ -139,10 +153,8 @@ function barOf(scale, whole) {
     ticks.append(mark);
   }
   const [low, high] = scale.column.range;
-  const short = (x) => written(Number(x.toPrecision(4)));
-  const spanned = `${short(scale.low)} to ${short(scale.high)}`;
   const beyond = low < scale.low || high > scale.high;
-  let said = `Colours span ${spanned}; values go from ${short(low)} to ${short(high)}`;
+  let said = `Colours span ${ends(scale.low, scale.high)}; values go from ${ends(low, high)}`;
   if (!whole && beyond) {
     said += scale.column.colours === "diverging"
       ? "; the 1 % farthest from 1 take the end colours"

@@ -1,4 +1,4 @@
-"""Pictures: bodies in both spaces, the split of the hull, the control mesh, distributions.
+"""Pictures: bodies and surfaces in both spaces, the split of the hull, the control mesh.
 
 Every ``draw_`` function returns a matplotlib Figure that belongs to no window; `png` turns one
 into bytes.  Three-dimensional views are rendered off screen by VTK and set into the figure, at
@@ -71,15 +71,15 @@ def draw_bodies(  # 10 arguments: what is drawn, and its look by keyword as in m
     folded, unfolded : (n, 3) float
         The blocks in both spaces.
     values : (n,) float, or two of these
-        What to colour by; a pair where the spaces differ in it.
+        Values to colour by; a pair if they differ between the spaces.
     label : str
-        What the values are, with their unit.
+        Name of the values, with their unit.
     limits : (float, float), optional
         Values of the first and last colour; 1st and 99th percentile by default.
     titles : (str, str)
-        What the two spaces are called.
+        Titles of the two spaces.
     colours, bands, sides, options
-        See `render_body`; by default both spaces have the sides found in the folded one.
+        As in `render_body`; by default both spaces have the sides found in the folded one.
     """
     options = options or ViewOptions()
     pair = values if isinstance(values, tuple) else (values, values)
@@ -120,14 +120,14 @@ def draw_surface(
     folded, unfolded : TriMesh
         The same faces in both spaces.
     values : (n,) or (m,) float
-        What to colour by, per vertex or per face.
+        Values to colour by, per vertex or per face.
     label, limits, colours, options
-        See `draw_bodies`.
+        As in `draw_bodies`.
 
     Raises
     ------
     InputError
-        As many values as there are neither vertices nor faces.
+        The number of values is neither that of the vertices nor that of the faces.
     MissingDependencyError
         Nothing can be drawn here; the message says what to install.
     """
@@ -163,11 +163,11 @@ def draw_split(
     mesh : TriMesh
         The hull.
     side : (m,) int
-        +1 on the top's half, -1 on the bottom's, 0 undecided.
+        +1 on the side of the top, -1 on that of the bottom, 0 undecided.
     rim : (m,) bool
         True on the rim.
     options : ViewOptions, optional
-        Where to look from; the second view has the opposite elevation.
+        Direction of view; the second view has the opposite elevation.
     """
     options = options or ViewOptions()
     if not len(mesh.F) == len(side) == len(rim):
@@ -198,7 +198,7 @@ def draw_split(
 
 
 def _tet_faces(T: Ints) -> Ints:
-    """Return the faces of tetrahedra that belong to one only, (m, 3), outward."""
+    """Return the faces that belong to one tetrahedron only, (m, 3), outward."""
     F = np.concatenate([T[:, [0, 2, 1]], T[:, [0, 1, 3]], T[:, [1, 2, 3]], T[:, [0, 3, 2]]])
     _, first, count = np.unique(np.sort(F, axis=1), axis=0, return_index=True, return_counts=True)
     border: Ints = F[np.sort(first[count == 1])]

@@ -23,7 +23,7 @@ _COLOURS = (TOP, BOTTOM, UNDECIDED, RIM)
 
 
 def cut_polygons(mesh: TetMesh, axis: int, at: float) -> tuple[Floats, np.ndarray]:
-    """Return where a plane across an axis cuts tetrahedra.
+    """Return the polygons in which a plane across an axis cuts tetrahedra.
 
     Parameters
     ----------
@@ -32,17 +32,17 @@ def cut_polygons(mesh: TetMesh, axis: int, at: float) -> tuple[Floats, np.ndarra
     axis : int
         0, 1 or 2: x, y or z is constant on the plane.
     at : float
-        Its value there; tetrahedra that only touch the plane are not cut.
+        Coordinate of the plane; tetrahedra that only touch the plane are not cut.
 
     Returns
     -------
     polygons : (m, 4, 2) float
-        Corners in the other two coordinates, in order around; the last of a triangle twice.
+        Corners in the other two coordinates, in order; the last corner of a triangle twice.
     element : (m,) int
-        The tetrahedron of each.
+        The tetrahedron of each polygon.
     """
     height = mesh.V[mesh.T, axis] - at
-    # Corners above the plane first: one, two or three of them.
+    # Corners above the plane come first: one, two or three of them.
     order = np.argsort(-height, axis=1, kind="stable")
     sorted_height = np.take_along_axis(height, order, axis=1)
     above = (sorted_height > 0).sum(axis=1)
@@ -65,9 +65,9 @@ def draw_cuts(meshes: Mapping[str, TetMesh], axis: int, at: float) -> Figure:
     Parameters
     ----------
     meshes : mapping of str to TetMesh
-        By title, in the same coordinates.
+        Meshes by title, in the same coordinates.
     axis, at
-        The plane: see `cut_polygons`.
+        The plane, as in `cut_polygons`.
 
     Raises
     ------
@@ -111,12 +111,12 @@ def draw_histograms(values: Mapping[str, Mapping[str, Floats]]) -> Figure:
     Parameters
     ----------
     values : mapping of str to mapping of str to array
-        By quantity, then by mesh.
+        Values by quantity, then by mesh.
 
     Raises
     ------
     InputError
-        No values, or some that are not finite.
+        There are no values, or some are not finite.
     """
     figure: Figure = require("matplotlib.figure").Figure(
         figsize=(12.5, 3.6), dpi=100, layout="constrained"

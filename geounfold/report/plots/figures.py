@@ -34,9 +34,9 @@ def png(figure: Figure) -> bytes:
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as SVG bytes, the same for the same figure; letters are left to the reader.
+    """Return a figure as SVG bytes, the same for the same figure; letters stay text.
 
-    What the drawing library has no letters for, the reader's fonts may have: it does not warn.
+    The reader's fonts draw the letters, so matplotlib's warnings of missing ones are suppressed.
     """
     buffer = io.BytesIO()
     how = {"svg.hashsalt": "geounfold", "svg.fonttype": "none"}
@@ -65,16 +65,16 @@ def colour_bar(
 
 
 def colour_limits(*values: Floats) -> Limits:
-    """Return the 1st and 99th percentile of values, drawn apart where they are one."""
+    """Return the 1st and 99th percentile of values, spread if they are equal."""
     low, high = np.percentile(np.concatenate([np.ravel(v) for v in values]), [1, 99])
     room = 1e-6 * max(abs(low), abs(high), 1e-6)
     return (float(low), float(high)) if high - low > room else (float(low), float(low + 2 * room))
 
 
 def ratio_limits(ratios: Floats, least: float = 0.02) -> Limits:
-    """Return limits as far below 1 as above: the 99th percentile of |ratio - 1|, or `least`.
+    """Return limits symmetric about 1: the 99th percentile of |ratio - 1|, at least `least`.
 
-    So 1 takes the middle colour, and changes too small to matter stay pale.
+    So 1 has the middle colour, and changes too small to matter stay pale.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def ratio_limits(ratios: Floats, least: float = 0.02) -> Limits:
 
 
 def extents(points: Floats) -> str:
-    """Return the extents of points, such as ``600 x 600 x 90``, to three figures or the unit."""
+    """Return the extents of points, such as ``600 x 600 x 90``, in three digits or whole units."""
     size = np.ptp(np.asarray(points), axis=0)
     return " × ".join(f"{s:.0f}" if s >= 100 else f"{s:.3g}" for s in size)
 
@@ -99,7 +99,7 @@ def draw_distribution(values: Floats, label: str) -> Figure:
     values : (n,) float
         One value per block.
     label : str
-        What they are.
+        Name of the values, shown on the axis.
     """
     v = np.ravel(np.asarray(values, dtype=np.float64))
     if not v.size or not np.isfinite(v).all():
@@ -137,9 +137,9 @@ def draw_curves(
     curves : mapping of str to (k,) float
         One curve per name.
     xlabel, ylabel : str
-        What the axes show.
+        Labels of the axes.
     logarithmic : bool
-        Whether the values' axis is logarithmic.
+        Whether the axis of the values is logarithmic.
     """
     figure = new_figure(8, 3.4)
     ax = figure.subplots()
@@ -154,5 +154,5 @@ def draw_curves(
 
 
 def _styles(n: int) -> list[str]:
-    """Return n line styles that do not rest on colour alone."""
+    """Return n line styles that differ in more than colour."""
     return [f"{('-', '--', ':', '-.')[i % 4]}C{i % 10}" for i in range(n)]

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
     from geounfold.estimation import Exploration, FittedVariogram
 
-# Okabe and Ito's colours, which stay apart for colour-blind readers.
+# Okabe and Ito's colours, which colour-blind readers can distinguish.
 ALONG, ACROSS, BARS, MEAN = "#0072B2", "#E69F00", "#999999", "#D55E00"
 
 _CURVE = 100  # points of a model's curve
 
 
 def charts(exploration: Exploration) -> dict[str, Figure]:
-    """Return every figure of an exploration by name, in the order to be shown."""
+    """Return every figure of an exploration by name, in the order of the page."""
     e = exploration
     return {
         "histogram": chart_histogram(e.histogram, e.grade),
@@ -77,9 +77,9 @@ def chart_variograms(
     Parameters
     ----------
     tables : mapping of DataFrame
-        As `estimation.directional` returns them, by space.
+        Results of `estimation.directional`, by space.
     models : mapping of FittedVariogram
-        By space.
+        Fitted models, by space.
     """
     figure, panels = _figure(len(tables), (4.4 * len(tables), 3.6))
     for axes, (space, table) in zip(panels, tables.items(), strict=True):
@@ -110,7 +110,7 @@ def chart_swaths(tables: Mapping[str, pd.DataFrame], grade: str) -> Figure:
 
 
 def chart_contacts(tables: Mapping[str, pd.DataFrame], grade: str) -> Figure:
-    """Draw mean grades by distance from contacts, outside left of them and inside right."""
+    """Draw mean grades by distance from contacts: outside on the left, inside on the right."""
     figure, panels = _figure(len(tables), (4.2 * len(tables), 3.2))
     for axes, (name, table) in zip(panels, tables.items(), strict=True):
         _profile(axes, table, grade)
@@ -135,7 +135,7 @@ def _profile(axes: Axes, table: pd.DataFrame, grade: str) -> None:
 
 
 def _plain(name: str) -> str:
-    """Return a column's name in which matplotlib sees no formula."""
+    """Return a column's name escaped, so that matplotlib reads no formula in it."""
     return name.replace("$", r"\$")
 
 

@@ -47,19 +47,19 @@ LIT: dict[str, Any] = {
 
 _SHADE = np.array([0.74, 0.86, 1.0])  # brightness of faces across x, y and z
 
-_MAX_CELLS = 30_000_000  # of the grid that hidden blocks are found with: 30 MB
+_MAX_CELLS = 30_000_000  # largest grid in which hidden blocks are found: 30 MB
 
 
 @functools.cache
 def check_rendering() -> None:
-    """Make sure that VTK can draw off screen.
+    """Check that VTK can draw off screen.
 
-    VTK ends the whole process where OpenGL is missing, so another process tries first.
+    VTK ends the whole process if OpenGL is missing, so another process tries first.
 
     Raises
     ------
     MissingDependencyError
-        A Python library or a system library is missing; the message names it and its cure.
+        A Python library or a system library is missing; the message names it and how to install it.
     """
     require("matplotlib")
     require("pyvista")
@@ -85,7 +85,7 @@ def _loads(library: str) -> bool:
 
 @contextmanager
 def _quiet_vtk() -> Iterator[None]:
-    """Keep VTK from telling standard error that there is no X server."""
+    """Suppress VTK's message on standard error that there is no X server."""
     logger = require("vtkmodules.vtkCommonCore").vtkLogger
     before = logger.GetCurrentVerbosityCutoff()
     logger.SetStderrVerbosity(logger.VERBOSITY_OFF)
@@ -96,7 +96,7 @@ def _quiet_vtk() -> Iterator[None]:
 
 
 def render_scene(mesh: Any, options: ViewOptions, **look: Any) -> Image:
-    """Return a picture (height, width, 3) of a pyvista mesh; `look` goes to add_mesh."""
+    """Return a picture (height, width, 3) of a pyvista mesh; `look` is passed to add_mesh."""
     check_rendering()
     pv = require("pyvista")
     with _quiet_vtk():
@@ -137,9 +137,9 @@ def _aim(plotter: Any, points: Floats, options: ViewOptions) -> None:
 
 
 def block_sides(points: Floats) -> Floats:
-    """Return the sides of boxes to draw blocks with, (3,), in the points' unit.
+    """Return the sides of the boxes drawn for blocks, (3,), in the points' unit.
 
-    The lattice's, where the coordinates along each axis are levels at equal steps; otherwise
+    The lattice's steps if the coordinates along each axis are equally spaced levels; otherwise
     cubes of the typical distance to the six nearest neighbours.
     """
     if len(points) < 2:
@@ -151,7 +151,7 @@ def block_sides(points: Floats) -> Floats:
     sample = points[:: max(1, len(points) // 4000)]
     nearest = cKDTree(points).query(sample, k=min(7, len(points)), workers=cores())[0]
     spacing = float(np.median(np.asarray(nearest)[:, 1:].mean(axis=1)))
-    return np.full(3, 1.08 * spacing if spacing > 0 else 1.0)  # no slits between turned cubes
+    return np.full(3, 1.08 * spacing if spacing > 0 else 1.0)  # no gaps between rotated cubes
 
 
 def level_step(column: Floats) -> float | None:
@@ -167,10 +167,10 @@ def level_step(column: Floats) -> float | None:
 
 
 def _seen(points: Floats, sides: Floats, towards: Floats) -> Bools:
-    """Tell which blocks can be seen: those without two layers of others before them.
+    """Return which blocks are visible: those without two layers of others in front of them.
 
-    Counted on a grid of the blocks' size, whose holes are closed, so that bodies off the lattice
-    keep their outer layers whole.
+    Layers are counted on a grid of the blocks' size with closed holes, so that the outer layers of
+    bodies off the lattice have no gaps.
     """
     cell = np.floor((points - points.min(axis=0)) / sides + 0.5).astype(np.int64) + 3
     shape = cell.max(axis=0) + 4
@@ -187,10 +187,10 @@ def _seen(points: Floats, sides: Floats, towards: Floats) -> Bools:
 
 
 def _boxes(points: Floats, sides: Floats, colours: Floats, towards: Floats) -> Any:
-    """Return a pyvista mesh of the faces of boxes that look towards the viewer, shaded.
+    """Return a pyvista mesh of the shaded faces of boxes that face the viewer.
 
-    Boxes along the axes need no light: in parallel projection each shows three faces at most,
-    always the same ones, with a brightness of their own.
+    Boxes along the axes need no light: in parallel projection at most three faces of each are
+    visible, the same for all boxes, and each direction has its own brightness.
     """
     pv = require("pyvista")
     quads = _QUADS[np.arange(3), (towards >= 0).astype(np.int64)]
@@ -219,18 +219,17 @@ def render_body(
     points : (n, 3) float
         Centroids, in any length unit.
     values : (n,) float
-        What to colour by.
+        Values to colour by.
     limits : (float, float)
-        Values of the first and the last colour; values beyond take these.
+        Values of the first and the last colour; values beyond have these colours.
     colours : str
-        Matplotlib's name of the colour map.
+        Name of the colour map in Matplotlib.
     bands : int
         Number of distinct colours.
     sides : (3,) or (n, 3) float, optional
-        Sides of the boxes drawn, of all or of each; found from the points by default (see
-        `block_sides`).
+        Sides of the boxes, for all or for each; by default found from the points (`block_sides`).
     options : ViewOptions, optional
-        Where to look from, and the size.
+        Direction of view, and size.
 
     Returns
     -------
@@ -239,7 +238,7 @@ def render_body(
     Raises
     ------
     InputError
-        Shapes that do not agree, values that are not finite, or limits that do not rise.
+        Shapes that do not agree, values that are not finite, or limits that do not increase.
     MissingDependencyError
         Nothing can be drawn here; the message says what to install.
     """
@@ -248,7 +247,7 @@ def render_body(
     if not limits[0] < limits[1]:
         raise InputError(f"limits must rise, but are {limits}")
     check_rendering()
-    P = P - P.mean(axis=0)  # graphics cards count in single precision
+    P = P - P.mean(axis=0)  # graphics cards compute in single precision
     box = block_sides(P) if sides is None else np.asarray(sides, dtype=np.float64)
     if box.shape not in ((3,), P.shape) or not (box > 0).all():
         raise InputError(f"sides must be positive and of shape (3,) or {P.shape}")

@@ -1,4 +1,4 @@
-"""Colours and options that all pictures share."""
+"""Colours and options of all pictures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Image = NDArray[np.uint8]
 
 Limits = tuple[float, float]
 
-# Okabe and Ito's colours, which stay apart for colour-blind readers.
+# Okabe and Ito's colours, which colour-blind readers can distinguish.
 TOP, BOTTOM, RIM, UNDECIDED = "#0072B2", "#E69F00", "#999999", "#CC79A7"
 
 LIBRARIES = ("libX11.so.6", "libGL.so.1", "libEGL.so.1")
@@ -23,18 +23,18 @@ LIBRARIES = ("libX11.so.6", "libGL.so.1", "libEGL.so.1")
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """How bodies are looked at.
+    """Options of a view of a body.
 
     Parameters
     ----------
     azimuth : float
-        Degrees anticlockwise from east to where the viewer stands.
+        Direction of the viewer, degrees anticlockwise from east.
     elevation : float
-        Degrees above the horizon, -90 to 90.
+        Elevation of the viewer, degrees above the horizon, -90 to 90.
     size : (int, int)
         Width and height of each three-dimensional view, pixels.
     max_blocks : int
-        Blocks drawn at most; of more that can be seen, every second, third ... is drawn.
+        Largest number of blocks drawn; if more are visible, every second, third ... is drawn.
     """
 
     azimuth: float = -65.0
@@ -52,7 +52,7 @@ class ViewOptions:
 
 
 def require(name: str) -> Any:
-    """Import an optional library, or raise MissingDependencyError saying how to get it."""
+    """Import an optional library; raise MissingDependencyError with the command to install it."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

@@ -6,16 +6,15 @@ upright, and whose restriction to the boundary is one-to-one, is one-to-one.  A 
 mesh is such a map, from the tetrahedra glued along their faces into space.  So it is an embedding
 when
 
-1. the tetrahedra are glued face to face and their boundary is a closed manifold,
-2. every tetrahedron has positive volume,
-3. the boundary does not intersect itself, and
-4. no part of the boundary lies inside out within another (a body may have cavities; the number of
-   tetrahedra over a place is the boundary's winding number about it, 0 or 1).
+1. the tetrahedra are glued face to face and their boundary is a closed manifold, 2. every
+tetrahedron has positive volume, 3. the boundary does not intersect itself, and 4. no part of the
+boundary lies inside out within another.  (A body may have cavities; the number of tetrahedra over a
+place is the boundary's winding number about it, 0 or 1.)
 
-Where both spaces are embeddings, the map from one to the other is one-to-one, and so is its
-inverse.  Orientations and intersections are decided by exact predicates (Shewchuk's, in libigl) on
-the very numbers that carry points.  Positive volumes alone are no proof: around an inner hinge the
-tetrahedra of a column may all be upright and yet overlap others two columns away.
+If both spaces are embeddings, the map from one to the other is one-to-one, and so is its inverse.
+Exact predicates (Shewchuk's, in libigl) decide orientations and intersections, on the same numbers
+that carry points.  Positive volumes alone are no proof: around an inner hinge the tetrahedra of a
+column may all be upright and yet overlap others two columns away.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ THEOREM = (
     "piecewise linear map between them is one-to-one"
 )
 
-_NAMED = 50  # most flaws that a certificate lists one by one
+_NAMED = 50  # largest number of flaws listed one by one
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +51,7 @@ class Gluing:
     F : (b, 3) int
         Boundary faces, outward.
     owner : (b,) int
-        Tetrahedron of each.
+        Tetrahedron of each face.
     misglued : (k,) int
         Tetrahedra at faces that more than two share, or two on the same side of.
     closed : bool
@@ -157,7 +156,7 @@ class Certificate(Mapping[str, Any]):
     Attributes
     ----------
     injective : bool
-        True only when all conditions of the theorem hold in both spaces: the map is one-to-one.
+        True only if all conditions of the theorem hold in both spaces: the map is one-to-one.
     tetrahedra, boundary_faces : int
         Numbers checked, including those of the shell around the body.
     glued : bool

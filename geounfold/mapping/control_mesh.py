@@ -36,7 +36,7 @@ class ControlMesh:
     def to_pyvista(self, space: Space = "folded") -> pyvista.UnstructuredGrid:
         """Return the tetrahedra in one space for pyvista.
 
-        Point data: ``stratigraphic``, and by the other space's name where each vertex lies there.
+        Point data: ``stratigraphic``, and each vertex's place in the other space under its name.
         """
         here, there, other = in_space(space, self.folded, self.unfolded)
         grid = here.to_pyvista()

@@ -1,7 +1,7 @@
 """Changes of lengths, areas, volumes and layers by a control mesh.
 
 Ratios are unfolded over folded, so that 1 is no change.  Signs are kept: a volume ratio is negative
-where an element is turned inside out.
+if an element is turned inside out.
 """
 
 from __future__ import annotations

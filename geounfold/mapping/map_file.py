@@ -58,7 +58,7 @@ class Layout:
     holds : callable, optional
         Returns whether the array meets the condition of `must`.
     must : str, optional
-        Completes "must ...".
+        The condition in words, after "must".
     """
 
     dtype: str
@@ -70,7 +70,8 @@ class Layout:
 
 
 def _is_rotation(matrix: NDArray[Any]) -> bool:
-    # A rotation made of doubles is off by 1e-15; one off by 1e-9 still carries to 1e-9 of the size.
+    # A rotation of doubles has an error of 1e-15; with 1e-9, points are carried to 1e-9 of the
+    # size.
     with np.errstate(all="ignore"):
         off = np.abs(matrix @ matrix.T - np.eye(3)).max()
         return bool(off < 1e-9 and np.linalg.det(matrix) > 0)
@@ -101,7 +102,7 @@ ARRAYS: Mapping[str, Layout] = {
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
 
 ADDED: Mapping[str, tuple[int, Any]] = {"coordinates": (3, 0)}
-"""Arrays that not every version has: the first that has it, and what it is in those before."""
+"""Arrays added later: the first version that has each, and its value in older files."""
 
 _HEAD: Mapping[str, Layout] = {
     "format": Layout(f"<U{len(FORMAT)}", ()),
@@ -114,8 +115,8 @@ _NPY = re.compile(
     rb"'shape': \(((?:\d{1,12}(?:, \d{1,12})*)?),?\), \} *\n"
 )
 _LONGEST_HEAD = 4096
-_ROOM = 64 << 20  # bytes to which any file may unpack
-_RATIO = 100  # times its own size to which a larger file may unpack; a map of 4,000 blocks: 2
+_ROOM = 64 << 20  # largest unpacked size of any file, bytes
+_RATIO = 100  # largest ratio of unpacked to packed size above that; 2 for a map of 4,000 blocks
 _LARGEST = 4 << 30
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _DAMAGE = (
@@ -183,8 +184,8 @@ def read_arrays(path: str | Path) -> Arrays:
     Raises
     ------
     InputError
-        No such file, one that cannot be read, not a map, of another version, damaged, or with
-        arrays that are no map's.
+        The file does not exist, cannot be read, is not a map, is of another version or damaged, or
+        has arrays that do not fit.
     """
     path = Path(path)
     content = _content(path)
@@ -208,7 +209,7 @@ def read_arrays(path: str | Path) -> Arrays:
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a regular file of a sane size."""
+    """Return the bytes of a regular file of a plausible size."""
     try:
         if path.is_dir():
             raise InputError(f"{path}: is a directory, not a map file")

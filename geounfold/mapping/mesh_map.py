@@ -1,4 +1,4 @@
-"""Carry points through a control mesh, both ways, and keep the map in a small file."""
+"""Carry points through a control mesh, both ways, and store the map in a small file."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class UnfoldingMap:
         Tetrahedra around it; its first vertices are those of the control mesh.
     reach : float
         Largest distance from the control mesh at which points are carried, in working units
-        (blocks).  A shell may end nearer, where limbs or a hinge's inner side leave no room.
+        (blocks).  A shell may end nearer if limbs or a hinge's inner side leave no room.
     known : sequence of TetIndex, optional
         Trees already built, used if they are over a space of the control mesh.
     coordinates : str
@@ -109,15 +109,15 @@ class UnfoldingMap:
         return PrismInterpolant.of(self.whole, self.coordinates)
 
     def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
-        """Carry points to the flat space, or with ``inverse`` from it back.
+        """Carry points to the flat space, or back with ``inverse``.
 
         Parameters
         ----------
         points : (n, 3) float
-            Folded points in the data's coordinates; with ``inverse`` unfolded points, whose
-            empty rows (all NaN: no image) stay empty.
+            Folded points in the data's coordinates; with ``inverse`` unfolded points.  Empty rows
+            (all NaN: no image) stay empty.
         inverse : bool
-            Direction.
+            True for the way from the flat space back to the folded one.
 
         Returns
         -------
@@ -250,8 +250,8 @@ class UnfoldingMap:
         Returns
         -------
         (n, 3, 3) float
-            As ``deformation_gradients``, folded directions in the working frame; that of the
-            prism's coordinates where a prism carries the point.
+            As ``deformation_gradients``, folded directions in the working frame; of the prism's
+            coordinates if a prism carries the point.
         """
         used, back = np.unique(element, return_inverse=True)
         out = deformation_gradients(self.whole, used)[back]

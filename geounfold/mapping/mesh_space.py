@@ -115,7 +115,7 @@ class MeshSpace:
         return None if self._shell is None else TetIndex(self._shell.V, self._shell.T)
 
     def locate(self, points: Floats) -> _Place:
-        """Return where points (n, 3) lie: the reference, libigl's."""
+        """Return the location of points (n, 3) by the reference index, libigl's."""
         element = self._index.locate(points)
         inside = element >= 0
         distance = np.zeros(len(points))

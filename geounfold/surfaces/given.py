@@ -12,7 +12,7 @@ from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.surfaces.split.result import SurfaceSplit
 
 EDGE = 1.5
-"""Edge length that reference surfaces are resampled to, working units."""
+"""Edge length to which reference surfaces are resampled, working units."""
 
 
 def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
@@ -21,7 +21,7 @@ def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
     Parameters
     ----------
     top, bottom : TriMesh
-        Hanging wall and footwall in working units, however oriented.
+        Hanging wall and footwall in working units, in any orientation.
 
     Raises
     ------

@@ -8,16 +8,16 @@
 Bodies are ``geounfold.synthetic.random_body(seed)`` for seeds from --seed on; --only unfolds one
 again, here and with a traceback.  Every body ends as one of
 
-  ok           unfolded, and its map is proved to be one-to-one
-  uncertified  unfolded with ``allow_uncertified`` alone: without that proof, or with blocks torn
+  ok           unfolded, and its map is proved one-to-one
+  uncertified  unfolded only with ``allow_uncertified``: without that proof, or with blocks torn
                from their neighbours or without an image
   refused      an error that geounfold raises on purpose; the right end of a closed tube
   crash        anything else: another exception, a wrong answer (coordinates that are not finite,
                a tube unfolded as a sheet), a process killed, over --seconds or over --memory
 
-A row of WORK/bodies.csv tells of each: figures in block sides, options, and for failures the
-reason.  A run that was stopped goes on where it was when it is started again with the same
-arguments.  Exit status 1 when a body crashed or more than 1 % of the sheets are uncertified.
+WORK/bodies.csv has one row for each body: figures in block sides, options, and the reason of a
+failure.  A run that was stopped continues if it is started again with the same arguments.  The
+exit status is 1 if a body crashed or more than 1 % of the sheets are uncertified.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ TRIANGLES = (
     *((1, 2, 5), (1, 5, 4)),
     *((2, 0, 5), (0, 3, 5)),
 )
-"""The border, outward where a, b, c are counter-clockwise seen from above."""
+"""The border, outward if a, b, c are counter-clockwise seen from above."""
 
 EDGES = tuple(
     sorted({(min(f[k - 1], f[k]), max(f[k - 1], f[k])) for f in TRIANGLES for k in range(3)})
@@ -47,7 +47,7 @@ def fans() -> tuple[tuple[int, ...], ...]:
     """Return for each corner the triangles around it, rows of TRIANGLES, in one sense."""
     out = []
     for corner in range(6):
-        # Of the edge that leaves the corner in a triangle to the one that comes back to it.
+        # From the edge that leaves the corner in a triangle to the edge that returns to it.
         leaves, comes = {}, {}
         for t, face in enumerate(TRIANGLES):
             if corner in face:

@@ -1,9 +1,9 @@
 """The map inside the prisms of a control mesh by Wachspress or mean value coordinates.
 
-Inside a tetrahedron barycentric coordinates are unique and the map is affine; from one to the next
-its gradient jumps, within a prism too.  Coordinates of the prism's six corners make it smooth
-inside.  On the split border they are linear as the tetrahedra are, so that the map is continuous
-whatever lies on the other side: another prism, or a tetrahedron that is part of none.
+Inside a tetrahedron barycentric coordinates are unique and the map is affine.  Its gradient jumps
+from one tetrahedron to the next, within a prism too.  Coordinates of the prism's six corners make
+the map smooth inside.  On the split border they are linear like those of the tetrahedra, so the map
+is continuous on every border, to another prism or to a tetrahedron that belongs to none.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from geounfold.mapping.prism_coordinates.mean_value import mean_value, mean_valu
 from geounfold.mapping.prism_coordinates.wachspress import wachspress, wachspress_gradients
 
 COORDINATES = ("tet", "wachspress", "mvc")
-"""Kinds of coordinates: of the tetrahedra, or of the prisms that they are cut from."""
+"""Kinds of coordinates: of the tetrahedra, or of the prisms from which they were cut."""
 
 TOLERANCE = 1e-12
 """Tolerance of the inverse, as a share of the mesh's size."""
 
-_BORDER = 1e-12  # barycentric coordinate from which on a point lies on the prism's border
-_INSIDE = -1e-9  # barycentric coordinate down to which a point counts as inside, for rounding
-_STEPS = 50  # most steps of Newton's method
+_BORDER = 1e-12  # barycentric coordinate up to which a point lies on the prism's border
+_INSIDE = -1e-9  # least barycentric coordinate of a point inside, to rounding
+_STEPS = 50  # largest number of steps of Newton's method
 _HALVINGS = 12
 _DECREASE = 1e-4  # smallest decrease of the residual, as a share of the predicted one
 _CHUNK = 1 << 11  # points at a time: 8 MB
@@ -49,13 +49,13 @@ class PrismInterpolant:
     name : str
         ``wachspress`` or ``mvc``.
     rows, corners : (p, 3), (p, 6) int
-        See ``whole_prisms``: those that are upright in both spaces.
+        Tetrahedra and corners of the prisms that are upright in both spaces (``whole_prisms``).
     prism : (m,) int
         The prism of each tetrahedron, -1 if it belongs to none and carries points itself.
     border : (m, 4) bool
         Whether the face opposite to each corner of a tetrahedron is on its prism's border.
     rational : (p,) bool
-        Prisms with Wachspress coordinates: folded they are strictly convex.  The others have mean
+        Prisms with Wachspress coordinates: those strictly convex when folded.  The others have mean
         value coordinates.
     tolerance : float
         Tolerance of the inverse, a distance in the unfolded space.
@@ -91,7 +91,7 @@ class PrismInterpolant:
         return cls(control, name, rows, corners, prism, border, rational, TOLERANCE * size)
 
     def counts(self) -> dict[str, int]:
-        """Return how many prisms have which coordinates, and how many tetrahedra are alone."""
+        """Return the number of prisms by kind of coordinates, and of tetrahedra in no prism."""
         return {
             "prisms": len(self.corners),
             "wachspress": int(self.rational.sum()),
@@ -100,7 +100,7 @@ class PrismInterpolant:
         }
 
     def held(self, element: Ints, weights: Floats) -> Ints:
-        """Return the rows of points that prisms carry: those inside one, off its border.
+        """Return the rows of points carried by prisms: those inside one, off its border.
 
         Tetrahedra carry the points on the border and outside of the mesh.
 
@@ -159,7 +159,7 @@ class PrismInterpolant:
         element : (k,) int
             The tetrahedron of each.
         start : (k, 3) float
-            Where the tetrahedra carry them.
+            Their images by the tetrahedra.
 
         Returns
         -------
@@ -168,7 +168,7 @@ class PrismInterpolant:
         stratigraphic : (k,) float
             The coordinate there.
         solved : (k,) bool
-            Whether the image is carried to the point, but for the tolerance.
+            Whether the image is carried to the point, to the tolerance.
         """
         image, third = np.empty_like(points), np.empty(len(points))
         solved = np.empty(len(points), dtype=bool)
@@ -196,7 +196,7 @@ class PrismInterpolant:
         return values, slopes
 
     def _by_kind(self, prism: Ints, first: _T, second: _T) -> Iterator[tuple[Ints, _T]]:
-        """Yield the rows whose prisms have Wachspress coordinates, and those that have not."""
+        """Yield the rows of prisms with Wachspress coordinates, then the other rows."""
         rational = self.rational[prism]
         for rows, kind in ((np.flatnonzero(rational), first), (np.flatnonzero(~rational), second)):
             if len(rows):
@@ -207,7 +207,7 @@ class PrismInterpolant:
         there = self.control.unfolded.V[self.corners[prism]]
 
         def off(rows: Ints, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-            with np.errstate(all="ignore"):  # a trial on a border has no weights, and is refused
+            with np.errstate(all="ignore"):  # trial points on a border are rejected
                 values, slopes = self._slopes(x, prism[rows])
                 missing = target[rows] - np.einsum("ni,nij->nj", values, there[rows])
             return values, slopes, missing, np.linalg.norm(missing, axis=1)
@@ -260,7 +260,7 @@ def _jacobian(corners: Floats, slopes: Floats) -> Floats:
 
 
 def _newton_step(J: Floats, missing: Floats) -> Floats:
-    """Return the solutions (n, 3) of J x = missing; infinite where J is singular."""
+    """Return the solutions (n, 3) of J x = missing; infinite if J is singular."""
     a, b, c = J[:, 0], J[:, 1], J[:, 2]
     normals = (np.cross(b, c), np.cross(c, a), np.cross(a, b))
     with np.errstate(all="ignore"):

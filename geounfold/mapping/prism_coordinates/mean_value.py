@@ -13,26 +13,26 @@ from geounfold.mapping.prism_coordinates.wachspress import normalised
 _I, _J = (np.array(ends) for ends in zip(*EDGES, strict=True))
 _OPPOSITE, _SENSE = opposite_edges()
 _FACES = np.array(TRIANGLES)
-_NEEDLE = 1e-3  # sine-like height of a spherical triangle below which it is taken for a needle
+_NEEDLE = 1e-3  # sine-like height of a spherical triangle below which it counts as a needle
 _TINY = 1e-300
 
 
 def mean_value(points: Floats, corners: Floats) -> Floats:
     """Return mean value coordinates of points inside prisms.
 
-    The triangle with corners at r_i from the point, seen as a spherical one, has the mean vector
-    ``m = sum theta_i n_i / 2`` with the angle theta_i of the edge opposite to i and the unit
-    normal n_i of its plane; its share in the weights solves ``sum w_i r_i = m``, so
-    ``w_i = (r_j x r_k) . m / det(r_i, r_j, r_k)`` (Ju, Schaefer and Warren 2005, "Mean value
-    coordinates for closed triangular meshes"; Floater, Kos and Reimers 2005, "Mean value
-    coordinates in 3D").  Triangles whose plane passes near the point far from themselves are
-    solved by half-angle formulas, where the above cancels.  Positive inside convex prisms; in
-    others they may be negative; linear on every triangle of the border.
+    The triangle with corners at r_i from the point, projected on the unit sphere, has the mean
+    vector ``m = sum theta_i n_i / 2``, with the angle theta_i of the edge opposite to i and the
+    unit normal n_i of its plane.  Its part of the weights solves ``sum w_i r_i = m``, so ``w_i =
+    (r_j x r_k) . m / det(r_i, r_j, r_k)`` (Ju, Schaefer and Warren 2005, "Mean value coordinates
+    for closed triangular meshes"; Floater, Kos and Reimers 2005, "Mean value coordinates in 3D").
+    The formula cancels if the plane of a distant triangle passes near the point; half-angle
+    formulas replace it then.  The coordinates are positive inside convex prisms and may be negative
+    in others; they are linear on every triangle of the border.
 
     Parameters
     ----------
     points : (n, 3) float
-        Inside; on the border the weights have no finite value.
+        Points inside; on the border the weights are not finite.
     corners : (n, 6, 3) float
         The prism of each point.
 
@@ -48,8 +48,8 @@ def mean_value(points: Floats, corners: Floats) -> Floats:
 def mean_value_gradients(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
     """Return the same with their gradients.
 
-    Differentiating ``sum w_i r_i = m`` gives ``sum dw_i r_i = dm + (sum w_i) dx``, solved as the
-    weights were.
+    Differentiating ``sum w_i r_i = m`` gives ``sum dw_i r_i = dm + (sum w_i) dx``, solved like the
+    weights.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def mean_value_gradients(points: Floats, corners: Floats) -> tuple[Floats, Float
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """Prisms as seen from a point in each.
+    """Prisms relative to a point in each.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class _View:
     normal : (3, 8, 3, n) float
         r_j x r_k for every corner of TRIANGLES.
     det : (8, n) float
-        Six times the volume under each; 1 where that is 0.
+        Six times the volume under each triangle; 1 if that is 0.
     share : (3, 8, n) float
         The weights.
     """
@@ -112,7 +112,7 @@ def _view(points: Floats, corners: Floats) -> _View:
 
 
 def _around(edges: Floats) -> Floats:
-    """Return half the sums around TRIANGLES, (3, 8, n), of what EDGES have, (3, 12, n)."""
+    """Return half the sums around TRIANGLES, (3, 8, n), of values on EDGES, (3, 12, n)."""
     a, b, c = (0.5 * _SENSE[:, k, None] * edges[:, _OPPOSITE[:, k]] for k in range(3))
     out: Floats = a + b + c
     return out
@@ -128,7 +128,7 @@ def _gathered(parts: Floats) -> Floats:
 
 
 def _without_needles(share: Floats, det: Floats, d: Floats, theta: Floats, area: Floats) -> Floats:
-    """Return weights (3, 8, n) with those of needle-like spherical triangles anew.
+    """Return weights (3, 8, n), recomputed for needle-like spherical triangles.
 
     With half circumference s and the longest side theta_1, ``s - theta_1`` follows from
     ``det^2 = 4 sin s sin(s - theta_1) sin(s - theta_2) sin(s - theta_3)`` without cancellation,
@@ -136,7 +136,7 @@ def _without_needles(share: Floats, det: Floats, d: Floats, theta: Floats, area:
     """
     unit = det / (d[_FACES[:, 0]] * d[_FACES[:, 1]] * d[_FACES[:, 2]])
     sides = theta[_OPPOSITE].swapaxes(0, 1)  # (3, 8, n)
-    # A flat one may cover half of the sphere instead: the point lies over the triangle itself.
+    # A flat triangle may cover half of the sphere: the point then lies on the triangle itself.
     around = sides.sum(axis=0)
     needle: Bools = (np.abs(unit) < _NEEDLE) & (around - sides.max(axis=0) < np.pi)
     if not needle.any():
@@ -160,7 +160,7 @@ def _without_needles(share: Floats, det: Floats, d: Floats, theta: Floats, area:
     across = np.take_along_axis(area[_OPPOSITE].swapaxes(0, 1)[:, needle], order, axis=0)
     with np.errstate(all="ignore"):
         solved = across * bracket / (2 * det[needle])
-    solved = np.where(np.isfinite(solved), solved, 0.0)  # in the plane itself: no share
+    solved = np.where(np.isfinite(solved), solved, 0.0)  # in the plane itself: no weight
     out = share.copy()
     kept = np.empty_like(solved)
     np.put_along_axis(kept, order, solved, axis=0)

@@ -19,17 +19,17 @@ _VOLUMES = [
 def wachspress(points: Floats, corners: Floats) -> Floats:
     """Return Wachspress coordinates of points inside convex prisms.
 
-    With p = n / h, the outward normal of a face over the point's distance from it, the weight of
-    a corner is the volume under the facet of the polar dual that the p of the faces around the
-    corner span, ``sum det(p_1, p_j, p_j+1)`` (Ju, Schaefer, Warren and Desbrun 2005, "A geometric
-    construction of coordinates for convex polyhedra using polar duals"; Floater, Gillette and
-    Sukumar 2014, "Gradient bounds for Wachspress coordinates on polytopes").  They are rational,
-    positive inside, and linear on every triangle of a strictly convex border.
+    Let p = n / h be the outward normal of a face divided by the point's distance from it.  The
+    weight of a corner is the volume under a facet of the polar dual, spanned by the p of the faces
+    around the corner: ``sum det(p_1, p_j, p_j+1)`` (Ju, Schaefer, Warren and Desbrun 2005, "A
+    geometric construction of coordinates for convex polyhedra using polar duals"; Floater, Gillette
+    and Sukumar 2014, "Gradient bounds for Wachspress coordinates on polytopes").  They are
+    rational, positive inside, and linear on every triangle of a strictly convex border.
 
     Parameters
     ----------
     points : (n, 3) float
-        Inside; on the border the weights have no finite value.
+        Points inside; on the border the weights are not finite.
     corners : (n, 6, 3) float
         The prism of each point, strictly convex.
 
@@ -46,7 +46,7 @@ def wachspress(points: Floats, corners: Floats) -> Floats:
 
 
 def wachspress_gradients(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
-    """Return the same with their gradients, as p has ``dp = p (p . dx)``.
+    """Return Wachspress coordinates with their gradients, from ``dp = p (p . dx)``.
 
     Returns
     -------

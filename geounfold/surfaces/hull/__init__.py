@@ -31,10 +31,10 @@ HULLS: dict[str, Maker] = {
     "poisson": poisson_hull,
 }
 
-UNEQUAL = 1.2  # block sides are taken for unequal above this ratio
-VOLUMES = (0.6, 1.5)  # enclosed volume over the blocks' that is taken for sound
-SAMPLE = 10_000  # points that are checked
-STRAYS = 0.01  # share of the points that may lie more than one block outside
+UNEQUAL = 1.2  # ratio of block sides above which they count as unequal
+VOLUMES = (0.6, 1.5)  # valid range of the enclosed volume over the blocks' volume
+SAMPLE = 10_000  # largest number of points checked
+STRAYS = 0.01  # largest share of the points more than one block outside
 
 
 def extract_hull(
@@ -58,15 +58,15 @@ def extract_hull(
     options : HullOptions, optional
         Lengths and thresholds.
     weights : (n,) float, optional
-        Volume of each point if it is a cell that blocks fill in part; 1 by default.
-        Methods but the density take the points of cells that are half full.
+        Volume of each point if it is a cell that blocks fill in part; 1 by default.  All methods
+        except the density use the points of cells that are at least half full.
 
     Raises
     ------
     OptionError
         Unknown method.
     HullError
-        The method made no closed manifold hull; the message names another one.
+        The method made no closed manifold hull; the message names another method.
     """
     check_one_of("hull", method, ("auto", *HULLS))
     points = np.asarray(points, dtype=np.float64)
@@ -83,7 +83,7 @@ def extract_hull(
 
 
 def _weighted(weights: Floats) -> dict[str, Maker]:
-    """Return the methods for points of some volume each."""
+    """Return the methods for points with a volume each."""
 
     def halved(make: Maker) -> Maker:
         return lambda points, sides, options: make(points[weights >= 0.5], sides, options)
@@ -114,10 +114,11 @@ def _first_suitable(
 
 
 def unsuitability(hull: Hull, points: Floats) -> str:
-    """Return why a hull does not fit the points it was made from; empty if it does.
+    """Return the reason why a hull does not fit the points it was made from; empty if it fits.
 
-    Its volume must be 0.6 to 1.5 times the blocks', what runs through the outermost centroids
-    counted half a block inside, and at most 1 % of the points may lie more than a block outside.
+    Its volume must be 0.6 to 1.5 times the blocks', corrected for a hull through the outermost
+    centroids, which runs half a block inside.  At most 1 % of the points may lie more than a block
+    outside.
     """
     sample = points[:: 1 + len(points) // SAMPLE]
     outside = float(np.mean(_outside_by(hull, sample) > 1.0))
@@ -131,7 +132,7 @@ def unsuitability(hull: Hull, points: Floats) -> str:
 
 
 def _outside_by(hull: Hull, points: Floats) -> Floats:
-    """Return how far each point lies outside the hull, (n,); negative inside."""
+    """Return the distance of each point outside the hull, (n,); negative inside."""
     index = _igl.SurfaceIndex(hull.mesh.V, hull.mesh.F)
     distance, face, foot = index.closest(points)
     normal = face_normals(hull.mesh.V, hull.mesh.F)[face]

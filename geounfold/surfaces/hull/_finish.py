@@ -90,7 +90,7 @@ def finish(
 
 
 def smoothed(hull: Hull) -> Hull:
-    """Return a hull whose vertices are smoothed by Taubin's steps, which keep the volume."""
+    """Return a hull with vertices smoothed by Taubin's steps, which keep the volume."""
     V = meshlab.taubin(hull.mesh.V, hull.mesh.F, SMOOTHING)
     return replace(hull, mesh=hull.mesh.with_vertices(V), volume=enclosed_volume(V, hull.mesh.F))
 

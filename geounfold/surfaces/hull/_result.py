@@ -1,4 +1,4 @@
-"""What every hull method returns."""
+"""Result of every hull method."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Hull:
     Attributes
     ----------
     mesh : TriMesh
-        One component, genus as the body's; edges of about 1.5 working units.
+        One component of the body's genus; edges of about 1.5 working units.
     method : str
         The method that made it: alpha, ball_pivoting, poisson or density.
     volume : float
@@ -27,19 +27,18 @@ class Hull:
     blocks_volume : float
         Volume of the blocks: their count, as one block is one cubic working unit.
     inset : float
-        How far inside the blocks' own outer faces the surface runs, in working units:
-        0.5 if it passes through the outermost centroids, 0 if it encloses the blocks,
-        negative if it runs outside of them.
+        Depth of the surface below the blocks' outer faces, in working units: 0.5 if it passes
+        through the outermost centroids, 0 if it encloses the blocks, negative outside of them.
     blur : float
-        Standard deviation (working units per unit of block side) of the Gaussian blur the
-        surface was made with; its curvature bias is undone later.  0 if there was none.
+        Standard deviation (working units per unit of block side) of the Gaussian blur of the
+        surface; its curvature bias is corrected later.  0 if there was none.
     dropped : int
         Faces of cavities and specks that were left out.
     even : bool
         True if the blur was as wide along every axis, ``blur`` in working units, though the
         blocks' sides differ.
     reason : str
-        Why this method was chosen, when the choice was automatic; else empty.
+        Reason for the method if the choice was automatic; else empty.
     """
 
     mesh: TriMesh

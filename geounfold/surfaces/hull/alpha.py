@@ -1,9 +1,9 @@
-"""Hull as an alpha shape of the outermost points, with the smallest alpha that holds them all.
+"""Hull as an alpha shape of the outermost points, with the smallest alpha that holds all of them.
 
-The alpha shape is taken on the shell of outermost points, a fifth to a third of all.  A ball
-of radius alpha that rolls in from outside removes the Delaunay tetrahedra it reaches through
-triangles it can pass; what it cannot reach, the hollow of the shell included, is the solid
-(the outer boundary of Edelsbrunner and Muecke's alpha shape).
+The alpha shape is taken on the shell of outermost points, a fifth to a third of all.  A ball of
+radius alpha rolls in from outside and removes the Delaunay tetrahedra that it reaches through
+triangles it can pass.  The rest, the hollow of the shell included, is the solid (its boundary is
+the outer one of Edelsbrunner and Muecke's alpha shape).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from geounfold.surfaces.hull._options import HullOptions
 from geounfold.surfaces.hull._result import Hull
 from geounfold.surfaces.hull.outermost_points import hull_through
 
-MARGIN = 1.05  # the smallest alpha is widened by this, past lengths that a lattice repeats
-LARGEST = 20.0  # block sides: an alpha beyond this bridges any gap worth the name
-HELD = 0.99  # share of the points that the solid's largest piece must have
-REPAIRS = 30  # rounds of mending edges in which the solid touches itself
-WIDEST = 3.0  # block sides: larger facets are cut away rather than filled at such edges
-_FACETS = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])  # outward when right-handed
+MARGIN = 1.05  # factor on the smallest alpha, past lengths that a lattice repeats
+LARGEST = 20.0  # block sides: a larger alpha bridges every gap
+HELD = 0.99  # least share of the points in the solid's largest piece
+REPAIRS = 30  # rounds of repair of edges at which the solid touches itself
+WIDEST = 3.0  # block sides: at such edges larger facets are cut away, not filled
+_FACETS = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])  # outward if right-handed
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def alpha_solid(points: Floats, alpha: float | None) -> tuple[Floats, Ints, floa
         Points on the outside of a body, in general position, block sides.
     alpha : float or None
         Radius of the rolling ball; None for the smallest that leaves 99 % of the points on one
-        solid (blocks that hang on by an edge only are not part of it).
+        solid.  Blocks connected by an edge only are not part of it.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def _solid(shape: _Complex, alpha: float) -> Bools:
 
 
 def _largest_piece(shape: _Complex, solid: Bools) -> tuple[Bools, float]:
-    """Return the largest piece (across facets) of a solid and the share of points it has."""
+    """Return the largest piece (across facets) of a solid and its share of the points."""
     number = np.append(np.where(solid, np.cumsum(solid) - 1, -1), -1)
     tet, facet = np.nonzero(solid[:, None] & (number[shape.neighbours] >= 0))
     n = int(solid.sum())
@@ -157,7 +157,7 @@ def _smallest_alpha(shape: _Complex) -> float:
 def _manifold_boundary(shape: _Complex, solid: Bools) -> tuple[Floats, Ints]:
     """Return the solid's boundary, mended at edges and vertices in which it touches itself.
 
-    Narrow wedges at such an edge are filled; if there are none the edge is cut free.
+    Narrow wedges at such an edge are filled; if there are none, the edge is cut free.
     """
     narrow = shape.radius.max(axis=1) < WIDEST
     for _ in range(REPAIRS):

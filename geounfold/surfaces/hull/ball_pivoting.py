@@ -13,10 +13,10 @@ from geounfold.surfaces.hull._result import Hull
 from geounfold.surfaces.hull.density import tie_break
 from geounfold.surfaces.hull.outermost_points import hull_through
 
-# Block sides, tried in this order: none passes a gap of a lattice's surface, whose holes are 0.87
-# wide.  Ties among cospherical points decide which one closes it.
+# Block sides, tried in this order.  None passes a gap of a lattice's surface, whose holes are 0.87
+# wide; which one closes the surface depends on ties among cospherical points.
 RADII = (1.2, 1.35, 1.05, 1.5)
-LONGEST_HOLE = 400  # edges of the longest border that is closed
+LONGEST_HOLE = 400  # largest number of edges of a hole that is closed
 
 
 def ball_pivoting_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:

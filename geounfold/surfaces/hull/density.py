@@ -7,13 +7,13 @@ function makes it linear in the depth: marching cubes on a grid of one block the
 surface as well as on half a block, with a quarter of the triangles.  After remeshing the
 vertices are moved on to the level set of the half-block grid by Newton steps.
 
-A sheet of one or two blocks is thinner than the blur: its density nowhere comes near that of
-solid blocks.  Its blur is wider and marching cubes run on the half-block grid, so that blocks that
-touch along edges only stay in one piece; how far outside the sheet the surface then runs follows
-from the density.
+A sheet of one or two blocks is thinner than the blur: its density stays far below that of solid
+blocks.  Its blur is wider and marching cubes run on the half-block grid, so that blocks that touch
+only along edges stay connected.  The surface then runs outside the sheet, at a distance that
+follows from the density.
 
-Only bricks near the blocks are stored, so time and memory follow the block count and not the
-bounding box, which a wide folded sheet fills poorly.
+Only bricks near the blocks are stored, so time and memory grow with the number of blocks, not with
+the bounding box, of which a wide folded sheet fills little.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from geounfold.surfaces.hull._result import UNEQUAL, Hull
 BRICK = 16  # grid nodes per brick and axis, at half a block
 NODE = 0.5  # node spacing of the splat, block sides
 RADIUS = 3.0  # reach of the blur, standard deviations
-CHUNK = 256  # bricks blurred at a time: bounds the temporary memory
+CHUNK = 256  # bricks blurred at a time, to limit temporary memory
 TIE_BREAK = 1e-4  # amplitude of the displacement that breaks exact ties, block sides
 THIN = (0.3, 0.7)
 """Share of a solid's density inside a sheet of one or two blocks.
@@ -121,7 +121,7 @@ class DensityField:
         return V + tie_break(V), F
 
     def inset(self, level: float, solid: float) -> float:
-        """Return how far inside a thin sheet's faces the surface at a level runs (< 0: outside).
+        """Return the depth of the surface at a level below a thin sheet's faces (< 0: outside).
 
         A sheet of thickness T and density ``solid`` has, blurred by a Gaussian of deviation b,
         the density ``solid (2 Phi(T / 2b) - 1)`` in its middle, and ``solid (Phi((t + T/2) / b)
@@ -195,22 +195,22 @@ def density_hull(
     blur, inset = field.blur, 0.0
     if thin:
         solid = float(sides.max() ** 3 / sides.prod())
-        sides = np.full(3, sides.max())  # flat blocks in a thin sheet may not even touch
+        sides = np.full(3, sides.max())  # flat blocks of a thin sheet may not touch
         field = density_field(points / sides, THIN_BLUR, weights)
         inset = field.inset(options.level, solid) * float(sides[0])
         blur = field.blur * float(sides[0])
     volume = len(points) if weights is None else float(weights.sum())
     hull = _finished(field, sides, volume, blur, options, inset=inset, fine=thin)
-    # Flat blocks climb a slope in stairs wider than the blur: unsmoothed, they pass for rims
-    # (rms 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
+    # On a slope, flat blocks form stairs wider than the blur; unsmoothed, stairs count as rims (rms
+    # 3.5 blocks instead of 0.06 on blocks 20 x 20 x 5 at 48 degrees).
     return smoothed(hull) if flat else hull
 
 
 def scattered_hull(points: Floats, sides: Floats, options: HullOptions) -> Hull:
     """Return the density hull of scattered points, each weighted by the volume around it.
 
-    At random points the density is uneven: it is blurred more, and what it would enclose
-    with nothing blurred counts as the blocks' volume.
+    The density of random points is uneven, so it is blurred more.  The volume enclosed without a
+    blur counts as the blocks' volume.
     """
     coarse = LOOSE / options.blur
     weights = local_spacing(points) ** 3
@@ -261,9 +261,8 @@ def density_field(
 def tie_break(V: Floats) -> Floats:
     """Return a smooth displacement (n, 3) that leaves no two edges of equal length.
 
-    On a lattice whole families of lengths are exactly equal, and which edge a remesher then
-    collapses or swaps would depend on the last bit.  Wave numbers are incommensurable with the
-    lattice and with each other.
+    On a lattice many lengths are exactly equal, so the last bit would decide which edge a remesher
+    collapses or swaps.  Wave numbers are incommensurable with the lattice and with each other.
     """
     waves = np.array([[1.931, 0.857, 1.409], [1.183, 2.087, 0.761], [0.911, 1.277, 1.787]])
     out: Floats = TIE_BREAK * np.sin(V @ waves + np.array([0.3, 1.1, 2.3]))
@@ -284,7 +283,7 @@ def _occupied(cell: Ints, reach: int) -> _Bricks:
 
 
 def _splat(q: Floats, reach: int, weights: Floats | None) -> tuple[_Bricks, float]:
-    """Spread each point over the eight nodes around it; also the mean variance that adds.
+    """Spread each point over the eight nodes around it; also return the mean variance added.
 
     The bricks leave room for a blur of ``reach`` nodes.
     """
@@ -323,7 +322,7 @@ def _blur(bricks: _Bricks, kernel: Floats) -> _Bricks:
 def _blur_last(bricks: _Bricks, values: Floats, weights: Floats, axis: int) -> Floats:
     """Apply weights (s + 2 reach, s) along the last axis, which is the grid's ``axis``.
 
-    The axes come back turned by one, so that three calls restore their order.
+    The axes are returned rotated by one, so that three calls restore their order.
     """
     step = np.zeros(3, dtype=np.int64)
     step[axis] = 1

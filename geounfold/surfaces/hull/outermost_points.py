@@ -1,4 +1,4 @@
-"""The outermost points of a body, with outward normals, and hulls made through them."""
+"""The outermost points of a body, with outward normals, and hulls through them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OUTER = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Shell:
-    """Points on a body's outside.
+    """Points on the outside of a body.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Shell:
     normals : (k, 3) float
         Outward unit normals.
     index : (k,) int
-        Their place among the points they were taken from.
+        Rows of these points in the input.
     """
 
     points: Floats
@@ -71,7 +71,7 @@ def hull_through(
     method: str,
     surface: Callable[[Shell], tuple[Floats, Ints]],
 ) -> Hull:
-    """Return the hull that a method makes through the outermost centroids.
+    """Return the hull through the outermost centroids by some method.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def hull_through(
     options : HullOptions
         ``blur`` finds the outermost points, ``edge`` is the hull's.
     method : str
-        Its name in HULLS.
+        Key in HULLS.
     surface : callable
         ``surface(shell) -> (V, F)``: the triangles, in block sides.
 

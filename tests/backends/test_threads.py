@@ -56,7 +56,7 @@ def test_an_error_in_a_slice_is_raised(monkeypatch):
 
 
 def test_where_memory_is_limited_there_are_no_threads_to_wait_for():
-    # CPython waits for ever for a thread whose start finds no memory.
+    # CPython waits for ever for a thread that could not start for lack of memory.
     code = """
 import resource
 from geounfold.backends import threads

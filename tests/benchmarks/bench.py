@@ -69,7 +69,7 @@ class Result:
         return float(statistics.median(getattr(run, what) for run in self.runs))
 
     def stage(self, name: str) -> float:
-        """Return the median seconds of one stage; 0 where it did not run."""
+        """Return the median seconds of one stage; 0 if it did not run."""
         return statistics.median(stages.get(name, 0.0) for stages in self.stages)
 
     def own(self) -> float:
@@ -78,7 +78,7 @@ class Result:
 
 
 def measure(command: list[str], folder: Path) -> Run:
-    """Run a command to its end; BenchmarkError with its last line where it fails."""
+    """Run a command to its end; BenchmarkError with its last line if it fails."""
     with tempfile.TemporaryFile("w+") as log:
         start = time.perf_counter()
         process = subprocess.Popen(
@@ -135,7 +135,7 @@ def table(rows: list[list[str]]) -> str:
 
 
 def row(r: Result, imports: float) -> list[str]:
-    """Return one body's row; of a body that failed, one that says why."""
+    """Return one body's row; for a body that failed, a row with the reason."""
     if r.error is not None:
         return [r.name, f"{r.blocks:,}", r.error, "", "", "", "", ""]
     wall = r.median("wall")
@@ -178,7 +178,7 @@ def import_baseline(python: str, runs: int, folder: Path) -> Result:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Measure, print, and write the tables where asked; return the exit status."""
+    """Measure, print, and write the tables if asked; return the exit status."""
     parser = argparse.ArgumentParser(description="time geounfold's command line")
     parser.add_argument("--runs", type=int, default=5, help="processes per body (default 5)")
     parser.add_argument("--only", nargs="+", choices=list(BODIES), default=list(BODIES))

@@ -9,11 +9,10 @@ border; lengths are in blocks.  Columns are those of `geounfold crosscheck`, a f
   rms_truth     RMS distance of our map's places from the truth, after the best proper rotation
   rms_truth_places   of the places that the other mesh gives
 
-Bodies that stand in the table already are left alone, so that a run goes on where it was stopped.
-`--width` cuts simulated bodies short along the fold axis, to a dozen blocks at least, which saves
-time and leaves their folds as they are; not those with an outline of their own.  Names are those
-of the simulated bodies, and of the acceptance bodies with `accept/` before them, where these are
-present.
+Bodies already in the table are skipped, so that a stopped run continues.  `--width` cuts simulated
+bodies short along the fold axis, to a dozen blocks at least, which saves time and leaves their
+folds as they are; not those with an outline of their own.  Names are those of the simulated bodies,
+and of the acceptance bodies with `accept/` before them, where these are present.
 """
 
 import argparse

@@ -108,7 +108,7 @@ def pykrige(points, values, targets):
 
 
 def gstools(points, values, targets):
-    """Krige from all samples by GSTools, which knows no neighbourhoods."""
+    """Krige from all samples by GSTools, which has no neighbourhoods."""
     import gstools as gs
 
     model = gs.Spherical(dim=3, var=1.0, len_scale=[RANGE, RANGE, RANGE / 10], nugget=0.0)

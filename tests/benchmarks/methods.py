@@ -36,7 +36,7 @@ def say(text):
 
 
 def rows(name, blocks, methods):
-    """Return one body's rows; None where it has no exact flat image."""
+    """Return one body's rows; None if it has no exact flat image."""
     body = gu.simulate(name, blocks=blocks)
     if not body.developable:
         return None

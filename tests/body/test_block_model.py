@@ -63,7 +63,7 @@ def test_each_angle_turns_what_it_says() -> None:
     plunging = axes_from_angles(0.0, plunge=30.0)
     assert np.isclose(plunging[1, 2], -0.5)
     assert np.isclose(plunging[0, 2], 0.0)
-    # A dip of 30 lowers the x axis, and leaves y where it is.
+    # A dip of 30 lowers the x axis, and does not move y.
     dipping = axes_from_angles(0.0, dip=30.0)
     assert np.isclose(dipping[0, 2], -0.5)
     assert np.allclose(dipping[1], [0, 1, 0])

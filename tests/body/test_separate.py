@@ -1,4 +1,4 @@
-"""Bodies that cannot have a top and a bottom are refused; separate bodies are told apart."""
+"""Bodies that cannot have a top and a bottom are refused; separate bodies are separated."""
 
 import numpy as np
 import pandas as pd
@@ -94,7 +94,7 @@ def test_a_folded_sheet_of_blocks_passes_however_thin(amplitude, turn):
 
 
 def test_one_layer_of_blocks_without_their_lattice_is_refused():
-    # The same sheet with centroids off by a fifth of a block: nothing tells a block's size.
+    # The same sheet with centroids off by a fifth of a block: the block's size is unknown.
     blocks = sheet(1, 3)
     moved = blocks + np.random.default_rng(3).normal(0, 0.2, blocks.shape) * [1, 1, 0]
     assert measure_lattice(moved) is None

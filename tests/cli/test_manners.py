@@ -237,7 +237,7 @@ def test_time_left_follows_the_stages() -> None:
 def test_nothing_is_foreseen_of_several_bodies_and_stages_may_be_missing() -> None:
     now = [0.0]
     forecast = Forecast(lambda: now[0])
-    for stage in ("frame", "split"):  # no hull where surfaces are given
+    for stage in ("frame", "split"):  # no hull if surfaces are given
         forecast.begin(stage)
         now[0] += 1.0
     forecast.begin("thesis")

@@ -1,4 +1,4 @@
-"""What the command line tells the report: every column, and the drill-holes carried along."""
+"""Data that the command line passes to the report: every column, and carried drill-holes."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ CLOSED = TriMesh(
 def test_one_row_per_surface_and_flattener():
     table = compare({"square": SQUARE, "tent": TENT})
     assert list(table.columns) == list(COLUMNS)
-    # All but those that call what is no free software, which run only where they are named.
+    # All except those that call software that is not free, which run only if they are named.
     free = {name for name, flattener in FLATTENERS.items() if flattener.free}
     assert free == set(FLATTENERS) - {"scaf"}
     assert len(table) == 2 * len(free)

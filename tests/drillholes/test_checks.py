@@ -153,7 +153,7 @@ def test_a_hole_with_assays_that_cannot_be_placed_is_refused(case: str) -> None:
     with pytest.raises(InputError, match=where):
         read_drillholes(*given)
     holes = read_drillholes(*given, drop_invalid=True)
-    # Hole B itself is lost where it has two collars, hole C or E elsewhere.
+    # Hole B itself is lost if it has two collars, else hole C or E.
     assert holes.names == (["A"] if case == "two collars" else ["A", "B"])
     assert set(holes.samples()["hole"]) == set(holes.names)
 

@@ -15,7 +15,7 @@ from tests.flattening.meshes import cap, grid
 
 def test_arap_that_shrinks_to_nothing_as_in_issue_54_of_the_bindings_is_an_error(monkeypatch):
     V, F = cap(n=9)
-    tiny = 1e-6 * V[:, :2]  # no triangle flips and no border meets: only lengths tell
+    tiny = 1e-6 * V[:, :2]  # no triangle flips and no border meets: only lengths are wrong
     monkeypatch.setattr(backend.ArapSteps, "__call__", lambda self, uv: tiny)
     for repair in (True, False):
         with pytest.raises(FlatteningError, match="arap: the flat map has collapsed"):

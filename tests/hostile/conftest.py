@@ -23,7 +23,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def folder(body: Path, tmp_path: Path) -> Path:
-    """The body, and an earlier output where the next ones are to be."""
+    """The body, and an earlier output in the place of the next ones."""
     for path in body.iterdir():
         shutil.copy(path, tmp_path / path.name)
     for name in ("out.csv", "s.json", "m.npz", "q.csv"):

@@ -262,7 +262,7 @@ def test_unusual_files_are_read_right(what: str, tmp_path: Path) -> None:
 
 
 class _Payload:
-    """Makes a file where it is unpickled."""
+    """Makes a file when it is unpickled."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return os.mkdir, ("executed",)

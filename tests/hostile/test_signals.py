@@ -126,7 +126,7 @@ def test_killed_everywhere(argv: tuple[str, ...], stage: str, folder: Path) -> N
 
 
 def test_a_run_that_cannot_react_is_left_at_once(folder: Path) -> None:
-    # A stopped process stands for one that is inside a library's call: it reacts to nothing.
+    # A stopped process acts like one inside a library's call: it reacts to nothing.
     before = state_of(folder)
     run = Run(*UNFOLD, "--overwrite", cwd=folder).until("writing")
     for worker in run.workers():

@@ -43,8 +43,8 @@ def test_sheets_and_rows_of_one_block(shape):
     points = cells * 2.0
     folded = points + np.sin(points[:, [1, 2, 0]] / 7)
     got = lattice_epsilon(points, folded, cells, np.ones(3), 26)
-    # A tree takes any of equally near blocks; measured: 0.06 off in the cube, half of whose blocks
-    # lie at its surface.
+    # A tree returns any of equally near blocks; measured: 0.06 off in the cube, half of whose
+    # blocks lie at its surface.
     assert got.mean() == pytest.approx(epsilon(points, folded).mean(), rel=0.1)
     assert np.isfinite(got).all()
 
@@ -96,7 +96,7 @@ def test_an_unfolding_is_measured_by_its_lattice():
     body = gu.simulate("plunging", width=200.0)
     u = gu.unfold(body.folded)
     tree = epsilon(u.folded, u.points)
-    # They differ where a tree breaks ties; measured: 0.3 % in the mean.
+    # They differ if a tree breaks ties; measured: 0.3 % in the mean.
     assert u.quality.nmd.mean == pytest.approx(tree.mean(), rel=0.02)
     deep = np.abs(u.columns["nmd_error"] - tree) < 1e-9  # all 26 around are there: no ties
     assert deep.mean() > 0.3

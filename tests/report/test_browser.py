@@ -118,7 +118,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _opened(browser: Any, report: Path, width: int = 1280, scheme: str = "light") -> Any:
-    """Return a page that is ready; what it complains of and asks for is kept with it."""
+    """Return a page that is ready; its errors and requests are kept with it."""
     context = browser.new_context(
         viewport={"width": width, "height": 900},
         color_scheme=scheme,

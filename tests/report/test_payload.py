@@ -27,7 +27,7 @@ FORMS = {"u1": "<u1", "u2": "<u2", "i2": "<i2", "u4": "<u4", "f4": "<f4", "f8": 
 
 
 def decoded(packed):
-    """Return an array as the page reads it, in the data's unit where it is quantised."""
+    """Return an array as the page reads it, in the data's unit if it is quantised."""
     codes = np.frombuffer(base64.b64decode(packed["data"]), dtype=FORMS[packed["form"]])
     if np.ndim(packed.get("offset", 0.0)):
         codes = codes.reshape(-1, 3)

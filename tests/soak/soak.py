@@ -109,7 +109,7 @@ def measure(row: Row, body: Any, u: Any) -> None:
     columns = u.columns
     stretch = np.maximum(columns["stretch_max"] - 1, 1 - columns["stretch_min"])[placed]
     level, truth = u.stratigraphic[placed], body.stratigraphic[placed]
-    # A body that was turned over has its top where its truth has the bottom.
+    # The top of a body that was turned over is the bottom of its truth.
     off = min((level - truth, 1 - level - truth), key=lambda d: float(np.abs(d).mean()))
     height = np.abs(off) * (body.top - body.bottom)[placed]
     row.epsilon = float(gu.epsilon(body.truth[placed], u.points[placed]).mean())
@@ -238,7 +238,7 @@ def finished(jobs: list[Job], seconds: float) -> Iterator[Row]:
 
 
 def tell(rows: list[Row]) -> None:
-    """Print one line of progress, and the last body where it failed."""
+    """Print one line of progress, and the last body if it failed."""
     counts = Counter(row.outcome for row in rows)
     row = rows[-1]
     if row.outcome != "ok" and not (row.family == "tube" and row.outcome == "refused"):
@@ -361,7 +361,7 @@ def draw(rows: list[Row], path: Path) -> None:
 
 
 def option(text: str) -> tuple[str, Any]:
-    """Return NAME=VALUE as a pair; values are JSON where they can be read so."""
+    """Return NAME=VALUE as a pair; values are JSON if they can be read so."""
     name, sign, value = text.partition("=")
     if not sign:
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE")

@@ -1,4 +1,4 @@
-"""The documentation: its examples run, and what it says of formats is what is so."""
+"""The documentation: its examples run, and its tables of formats are true."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ ROWS = _format_rows()
 
 
 def _verbs(ending: str, what: str) -> str:
-    """Return what the program does with files of an ending, as the table says it."""
+    """Return what the program does with files of an ending, in the table's words."""
     if ending in TABLE_ENDINGS:
         return "-" if (what, ending) == ("surface", ".csv.gz") else "read, write"
     ways = [
@@ -82,7 +82,7 @@ def test_the_table_says_what_is_read_and_written(ending: str) -> None:
     found = next(f for f in FORMATS if ending in (*f.reads_points, *f.reads_surface))
     assert name == found.name
     assert library.startswith(found.library or library)
-    # Texts become codes where only numbers can be held, of points that can be written.
+    # Texts become codes if only numbers can be held, for points that can be written.
     assert ("texts as codes" in again) == (found.numbers_only and "write" in points)
 
 
@@ -132,7 +132,7 @@ WITH_COMMANDS = [page for page in (README, *PAGES) if commands(page)]
 @pytest.mark.parametrize("page", WITH_COMMANDS, ids=_name)
 def test_commands_have_the_options_that_the_pages_give_them(page: Path) -> None:
     for arguments in commands(page):
-        build_parser().parse_args(arguments)  # leaves by SystemExit where one is unknown
+        build_parser().parse_args(arguments)  # raises SystemExit if one is unknown
 
 
 @pytest.fixture(scope="module")

@@ -352,5 +352,5 @@ def test_users_strict_mypy_is_content(tmp_path: Path) -> None:
 
     done = checked("user.py")
     assert done.returncode == 0, done.stdout + done.stderr
-    done = checked("wrong.py")  # the hints say something, after all
+    done = checked("wrong.py")  # the type hints have an effect
     assert done.stdout.count("error:") == 2, done.stdout

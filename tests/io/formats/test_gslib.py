@@ -19,7 +19,7 @@ def test_gslib_as_in_the_book(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no coordinate columns.*Xlocation"):
         read_points(tmp_path / "cluster.dat")
     table = read_table(tmp_path / "cluster.dat")
-    # Nothing in such a file says that -999 is missing.
+    # Such a file does not declare -999 as missing.
     assert table.frame["secondary"].tolist() == [0.22, -999.0]
     named = read_points(tmp_path / "cluster.dat", ("Xlocation", "Ylocation", "primary"))
     assert named.points.tolist() == [[39.5, 18.5, 0.06], [5.5, 1.5, 0.06]]

@@ -1,4 +1,4 @@
-"""Pictures: that they show what they say, and that what is missing is named."""
+"""Pictures: they show what their titles name, and errors name what is missing."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def test_a_missing_python_library_is_named_with_its_cure():
     [(lambda _: False, "libEGL.so.1 missing.*libegl1"), (lambda _: True, "ended with -11")],
 )
 def test_a_trial_that_dies_is_told_apart_from_a_missing_library(monkeypatch, loads, message):
-    """VTK ends with a segmentation fault where OpenGL is missing: that must not be us."""
+    """VTK ends with a segmentation fault if OpenGL is missing; geounfold must not."""
     pytest.importorskip("pyvista")
     died = SimpleNamespace(returncode=-11)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: died)

@@ -1,4 +1,4 @@
-"""Rims that taper and limbs whose ends come close: what the hull alone tells wrongly there."""
+"""Rims that taper and limbs whose ends come close, for which the hull alone is misleading."""
 
 import numpy as np
 import pytest

@@ -46,7 +46,7 @@ def test_a_body_held_by_its_sheet_is_not_fitted_again() -> None:
     body = gu.simulate("noisy", blocks=6000)  # blocks disturbed: no lattice, no layers
     once, default = unfold_without_closer_fit(body.folded), gu.unfold(body.folded)
     fitted = default.fits[0].sheet.fitted
-    # Measured 0.006 blocks; the default asks for 0.008.
+    # Measured 0.006 blocks; the limit is 0.008.
     assert fitted.left_out(default.frame.to_work(body.folded)) < HOLDS
     np.testing.assert_array_equal(once.points, default.points)
 

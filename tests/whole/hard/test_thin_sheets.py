@@ -64,7 +64,7 @@ def test_the_hull_of_one_layer_says_how_far_outside_the_blocks_it_runs():
     hull = extract_hull(cells.reshape(-1, 3) * 1.0, np.ones(3), "density", HullOptions())
     V = hull.mesh.V[np.abs(hull.mesh.V[:, :2] - 19.5).max(axis=1) < 12]
     outside = V[V[:, 2] > 0, 2] - 0.5
-    # Measured 0.688 and 0.689, told 0.704: the model has boxes where the field has points.
+    # Measured 0.688 and 0.689, predicted 0.704: the model has boxes, the field has points.
     assert outside == pytest.approx(-hull.inset, abs=0.03)
 
 

@@ -114,7 +114,7 @@ def test_split_finds_top_and_bottom_of_close_limbs(recipe: FoldSpec) -> None:
     # Measured 0.997 and more of the faces; half of them by chance.
     assert (side[top] == 1).mean() > 0.98
     assert (side[bottom] == -1).mean() > 0.98
-    # Flanks are told from the sheet: measured 0.93 and more of the faces square to the layers.
+    # Flanks are separated from the sheet: measured 0.93 and more of the faces square to the layers.
     assert result.beyond[np.abs(lift) < 0.2].mean() > 0.85
 
 

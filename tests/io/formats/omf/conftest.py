@@ -11,7 +11,7 @@ from tests.io.formats.omf.files import DATA, MAKE
 
 @pytest.fixture(scope="module", params=["at hand", "in data"])
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return where files are: of both libraries in the data, of the one at hand written now."""
+    """Return folders of files: of both libraries from the data, of the installed one new."""
     if request.param == "in data":
         return DATA
     pytest.importorskip("omf", reason="omf (extra formats) is not installed")

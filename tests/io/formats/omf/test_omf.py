@@ -22,7 +22,7 @@ from tests.io.formats.omf.files import DATA, MAKE, XYZ
 
 
 def omf_of(version: int) -> Any:
-    """Return the library, where it is the one of a version; else skip."""
+    """Return the library if it has the version; else skip."""
     omf = pytest.importorskip("omf", reason="omf (extra formats) is not installed")
     if MAKE["is_first"](omf) != (version == 1):
         wanted = "1.0.1" if version == 1 else "2.0.0a0"

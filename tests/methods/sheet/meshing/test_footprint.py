@@ -31,8 +31,8 @@ def test_parts_far_apart_are_an_error(apart: list[float]) -> None:
 
 
 def test_a_slab_of_few_blocks_stays_flat() -> None:
-    # All its sites lie near its rim, so that none speaks against the first fit.
+    # All its sites lie near its rim, so that none contradicts the first fit.
     X = grid_cells(30, 20, 4) * 1.0
     u = gu.unfold(X)
-    # Measured 0.003 of a block; 0.1 where it was fitted again all the same.
+    # Measured 0.003 of a block; 0.1 if it was fitted again all the same.
     assert gu.aligned_rms(u.points, X) < 0.02

@@ -1,4 +1,4 @@
-"""Lattice sites and layers: what they say, and that a sheet listens."""
+"""Sharpening by lattice sites and by layers."""
 
 from itertools import product
 

@@ -112,7 +112,7 @@ def spring_dynamic(
     with np.errstate(over="ignore", invalid="ignore"):  # divergence is detected and raised
         uv, count, stop = run(motion, uv, options, history)
     flips = flip_count(uv, problem.mesh.F)
-    note = f"{flips} triangles are folded over: springs do not bar it" if flips else ""
+    note = f"{flips} triangles are folded over: the springs do not prevent it" if flips else ""
     return finish(problem, uv, "spring_dynamic", stop, count, history, note)
 
 

@@ -86,7 +86,7 @@ def ufo(problem: Problem, start: Floats | None, options: UfoOptions) -> Flatteni
         begin = plan(problem) if start is None else start
         uv, count, stop = _release(motion, begin, options, history)
     flips = flip_count(uv, problem.mesh.F)
-    note = f"{flips} triangles are folded over: nothing bars it" if flips else ""
+    note = f"{flips} triangles are folded over: nothing prevents it" if flips else ""
     return finish(problem, uv, "ufo", stop, count, history, note)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from geounfold.geometry.mesh import Floats
 from geounfold.report.plots.rendering import level_step
 
-_LEVELS = 65534  # the highest code of 16 bits; one more stands for no value
+_LEVELS = 65534  # the highest code of 16 bits; one more means no value
 
 
 def encoded(values: ArrayLike, form: str) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def encoded(values: ArrayLike, form: str) -> dict[str, Any]:
 
 
 def quantised(values: Floats, origin: float, step: float) -> dict[str, Any]:
-    """Return ``round((values - origin) / step)`` in 16 bits; 65535 where there is no value."""
+    """Return ``round((values - origin) / step)`` in 16 bits; 65535 if there is no value."""
     codes = np.rint((values - origin) / step)
     codes = np.where(np.isnan(codes), _LEVELS + 1, np.clip(codes, 0, _LEVELS))
     return {"offset": origin, "step": step, **encoded(codes, "u2")}
@@ -67,5 +67,5 @@ def _step(column: Floats) -> float:
 
 
 def floating_points(points: Floats, origin: Floats) -> dict[str, Any]:
-    """Return points as float32 relative to an origin; NaN where there is none."""
+    """Return points as float32 relative to an origin; NaN if there is none."""
     return {"offset": origin.tolist(), **encoded(points - origin, "f4")}

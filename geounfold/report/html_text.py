@@ -35,7 +35,7 @@ def number(value: object) -> str:
 
 
 def json_for_script(content: object) -> str:
-    r"""Return JSON that can stand inside a ``<script>``: no tag or comment can begin in it.
+    r"""Return JSON that can be put inside a ``<script>``: no tag or comment can begin in it.
 
     Examples
     --------
@@ -62,12 +62,12 @@ def mapping(value: object) -> Mapping[str, Any]:
 
 
 def section(title: str, content: str) -> str:
-    """Return a titled section; nothing where there is no content."""
+    """Return a titled section; nothing if there is no content."""
     return f"<section>\n<h2>{text(title)}</h2>\n{content}\n</section>" if content else ""
 
 
 def folded_up(title: str, content: str, name: str = "") -> str:
-    """Return a section that opens on demand; nothing where there is no content."""
+    """Return a section that opens on demand; nothing if there is no content."""
     if not content:
         return ""
     known = f' id="{text(name)}"' if name else ""
@@ -75,13 +75,13 @@ def folded_up(title: str, content: str, name: str = "") -> str:
 
 
 def bullets(items: Iterable[object]) -> str:
-    """Return a list of sentences; nothing where there are none."""
+    """Return a list of sentences; nothing if there are none."""
     lines = "".join(f"<li>{text(item)}</li>" for item in items)
     return f"<ul>{lines}</ul>" if lines else ""
 
 
 def pairs(values: Mapping[str, Any]) -> str:
-    """Return names and values as a table of two columns; nothing where there are none."""
+    """Return names and values as a table of two columns; nothing if there are none."""
     rows = "".join(
         f'<tr><th scope="row">{text(k)}</th><td>{text(number(v))}</td></tr>'
         for k, v in values.items()
@@ -124,7 +124,7 @@ def bars(values: Mapping[str, float], unit: str) -> str:
 
 
 def copyable(name: str, title: str, content: str) -> str:
-    """Return a text in a box with a button that copies it; nothing where there is no text."""
+    """Return a text in a box with a button that copies it; nothing if there is no text."""
     if not content:
         return ""
     return (

@@ -10,7 +10,7 @@ from typing import Any
 
 
 def without_folders(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the summary with every file that it knows named without its folder.
+    """Return the summary with every file name in it without its folder.
 
     Known are the files of its ``input``, ``samples`` and ``drillholes``, and the words of its
     ``command``; they are replaced wherever they stand, warnings included.

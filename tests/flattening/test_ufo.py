@@ -42,7 +42,7 @@ def test_ufo_stays_folded_where_its_projection_is_and_is_mended_or_says_so():
     mesh = cylinder(n=31, m=5, angle=4.4)[:2]
     flat = flatten(mesh, "ufo", repair=False)
     assert flat.flips > 0
-    assert "folded over: nothing bars it" in flat.note
+    assert "folded over: nothing prevents it" in flat.note
     assert measures.edge_strain(*mesh, flatten(mesh).uv) < 1e-12 < 1e-3 < flat.edge_error[-1]
     mended = flatten(mesh, "ufo")
     assert mended.one_to_one

@@ -41,7 +41,7 @@ _MISFIT = 2.5
 """Departure from the half thickness, in blocks, above which a hull vertex is not used."""
 
 _STIFFNESS = 1e-4
-"""Weight that draws the heights to the half thickness where there are no hull vertices."""
+"""Weight that draws the heights to the half thickness far from hull vertices."""
 
 _SEPARATE = 1.5
 """Smoothing length of the change of the heights by the lattice sites, in blocks."""

@@ -37,3 +37,11 @@ def test_progress_gives_way_to_an_error() -> None:
     console.error("no\nhull")
     assert terminal.text.endswith("\r\x1b[Kgeounfold: error: no hull\n")
     assert "\x1b[31m" not in terminal.text
+
+
+def test_a_warning_is_printed_once() -> None:
+    terminal = _Terminal(live=False)
+    console = Console(stream=terminal)  # type: ignore[arg-type]
+    for text in ("far", "near", "far"):
+        console.warn(text)
+    assert terminal.text == "geounfold: warning: far\ngeounfold: warning: near\n"

@@ -10,8 +10,16 @@ from geounfold.errors import NoSheetError, OptionError, SplitError
 from geounfold.geometry.measures import face_normals, triangle_areas
 from geounfold.geometry.mesh import Bools, Floats, TriMesh
 from geounfold.surfaces.hull import extract_hull
-from geounfold.surfaces.split import NORMAL_THRESHOLD, SPLITS, signed_graph, split, split_signed
+from geounfold.surfaces.split import (
+    NORMAL_THRESHOLD,
+    SPLITS,
+    pairs,
+    signed_graph,
+    split,
+    split_signed,
+)
 from geounfold.surfaces.split.is_sheet import MIN_EXTENT, side_extent
+from geounfold.surfaces.split.pairs import BENT_ADVANTAGE, CANDIDATES
 from geounfold.surfaces.split.result import SurfaceSplit
 from tests.shapes import box, rotation
 
@@ -156,6 +164,39 @@ def test_thick_bodies_are_no_sheets(points: Floats, method: str) -> None:
 def test_strips_and_lenses_are_sheets(points: Floats) -> None:
     result = split(hull_of(points))
     assert min(side_extent(result)) > MIN_EXTENT
+
+
+def test_candidates_are_listed_by_area_and_the_largest_measure_is_taken(slab: TriMesh) -> None:
+    found = split(slab).candidates
+    assert [c.name for c in found] == list(CANDIDATES)
+    assert [c.taken for c in found] == [True, False, False]
+    assert all(c.plane and c.measure == c.extent / BENT_ADVANTAGE for c in found)
+    # 40 x 30 over 8^2 is 18.75; faces beside the edges belong to no pair.  Flanks: 40 x 8 / 30^2.
+    assert 34 * 24 / 64 < found[0].extent < 18.75
+    assert found[1].extent < 40 * 8 / 30**2
+    assert list(found[0].row()) == ["name", "extent", "plane", "measure", "taken"]
+
+
+def test_a_bent_layer_is_preferred_to_its_larger_plane_flanks() -> None:
+    columns, rows, layers = box(80, 6, 9).T  # 6 wide and 9 thick: the flanks are the larger pair
+    bent = np.stack([columns, rows, layers + 6 * np.sin(columns / 14)], axis=1)
+    found = split(hull_of(bent)).candidates
+    assert [(c.plane, c.taken) for c in found[:2]] == [(True, False), (False, True)]
+    assert found[0].extent > found[1].extent
+    assert found[1].measure > found[0].measure
+
+
+def test_a_hull_without_a_pair_of_sides_is_its_own_candidate(
+    slab: TriMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pairs, "LOOKS_BACK", 1.0)  # no two faces look straight back at each other
+    result = split(slab)
+    assert [(c.name, c.taken) for c in result.candidates] == [("whole hull", True)]
+    assert not result.beyond.any()
+
+
+def test_nothing_is_chosen_by_normals(slab: TriMesh) -> None:
+    assert split(slab, "normal").candidates == ()
 
 
 def test_unknown_method_lists_the_valid_ones(slab: TriMesh) -> None:

@@ -25,6 +25,7 @@ def sheet_method(body: PreparedBody) -> BodyFit:
     unit = 1 if body.coarse is None else body.coarse.merge
     notes = {
         "merged": unit,
+        "split": [candidate.row() for candidate in body.split.candidates],
         "attempts": [trial.row() for trial in result.trials],
         "rung": mesh.rungs[-1].name,
         "rungs": [asdict(rung) for rung in mesh.rungs],

@@ -17,22 +17,42 @@ from geounfold.geometry.measures import (
 )
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 
-CREASE_WIDTH = 0.05  # 1 - cosine at which two neighbours' pull has fallen to 1/e
+SAME_WAY = 0.866
+"""Cosine (30 degrees) above which two directions count as the same.
 
+Neighbours' normals across no crease of the rim; the inward normal and the way to a near face.
+Measured: twice the angle changes the rim by up to 30 % of the area at creases, 6 % at near faces.
+"""
 
-FACING = 0.5  # faces are opposite when -N.N' exceeds this
+CREASE_WIDTH = 0.05
+"""1 - cosine of two neighbours at which their pull has fallen to 1/e.
 
+Of 106 hulls, half or twice moves sides by 1 % of the area or more on 80, by 44 % at most.
+"""
 
-THICKEST = 2.0  # a ray longer than this many medians has missed the other side
+FACING = 0.5
+"""Cosine -N.N' above which two faces are opposite.
 
+Measured: half the angle refuses two sheets; twice moves the rim by up to 6 % of the area.
+"""
 
-NEARBY = 1.5  # medians within which the nearest face of the other side is opposite ...
+THICKEST = 2.0
+"""Length of a ray, in median thicknesses, above which it has missed the other side.
 
+Measured: half changes the rim of every hull, by up to 43 % of the area; twice by up to 19 %.
+"""
 
-AHEAD = 0.866  # ... if it lies within 30 degrees of the inward normal
+NEARBY = 1.5
+"""Distance, in median thicknesses, within which the nearest face of the other side is opposite.
 
+Measured: half changes the rim by up to 13 % of the area, twice by up to 6 %.
+"""
 
-SWEEPS = 12  # bilateral sweeps that smooth the normals
+SWEEPS = 12
+"""Bilateral sweeps that smooth the normals.
+
+Measured: half or twice moves sides by up to 37 % of the area, by 1 % or more on 14 of 106 hulls.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +124,7 @@ def met_nearby(mesh: TriMesh, faces: Faces, side: Ints) -> Faces:
     """Return the faces, those that met nothing opposite the nearest face of the other side.
 
     The ray from the outside of a tight hinge misses the slit between the limbs and runs on
-    along one of them, though the slit's end is near.  The nearest point counts where it lies
+    along one of them, though the slit's end is near.  The nearest point counts if it lies
     within 30 degrees of the inward normal and 1.5 thicknesses away.  ``side`` (m,) is 0 on
     faces already known to be rim.
     """
@@ -117,7 +137,7 @@ def met_nearby(mesh: TriMesh, faces: Faces, side: Ints) -> Faces:
         index = _igl.SurfaceIndex(mesh.V - mesh.V.mean(axis=0), mesh.F[theirs])
         far, face, foot = index.closest(faces.centre[mine])
         way = unit(foot - faces.centre[mine])
-        ahead = -np.einsum("ij,ij->i", way, faces.smoothed[mine]) > AHEAD
+        ahead = -np.einsum("ij,ij->i", way, faces.smoothed[mine]) > SAME_WAY
         good = ahead & (far < NEARBY * faces.median)
         rows = mine[good]
         hit[rows], distance[rows], facing[rows] = theirs[face[good]], far[good], 1.0

@@ -2,9 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pair of opposite sides among which a split chose.
+
+    Attributes
+    ----------
+    name : str
+        Its place among the body's pairs by area, or the whole hull.
+    extent : float
+        Area of its smaller side over the squared thickness between its sides.
+    plane : bool
+        Whether both sides are plane.
+    measure : float
+        What it was judged by (`geounfold.surfaces.split.pairs`); the largest is taken.
+    taken : bool
+        Whether the sheet's top and bottom are this pair.
+    """
+
+    name: str
+    extent: float
+    plane: bool
+    measure: float
+    taken: bool = False
+
+    def row(self) -> dict[str, object]:
+        """Return its figures for the summary."""
+        return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +60,9 @@ class SurfaceSplit:
         True when the caller's ``up`` (or the default) turned the two sides round.
     beyond : (m,) bool
         True on flanks and ends: faces that a ridge parts from top and bottom.
+    candidates : tuple of Candidate
+        The pairs of opposite sides among which top and bottom were chosen, by area; empty if
+        nothing was chosen (method ``normal``, given surfaces).
     """
 
     mesh: TriMesh
@@ -42,6 +74,7 @@ class SurfaceSplit:
     adjacency: Ints
     flipped_up: bool
     beyond: Bools
+    candidates: tuple[Candidate, ...] = ()
 
     def scaled(self, factor: float) -> SurfaceSplit:
         """Return the split in another unit: lengths times a factor."""

@@ -57,7 +57,7 @@ Measured: flanks of strips from 0.987 on, sides of a gently bent layer with a ho
 BENT_ADVANTAGE = 8.0
 """Divisor of a plane pair's extent: a fold no wider than it is thick is plane seen from its flanks.
 
-Measured: at half, two of three strips narrower than thick are split by their flanks.
+Measured: at half, two strips narrower than thick are split by their flanks; twice has no effect.
 """
 
 

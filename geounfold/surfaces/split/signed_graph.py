@@ -19,7 +19,8 @@ Measured: half or twice moves sides by up to 1.3 % of the area.
 COARSE_ABOVE = 12_000
 """Faces above which the graph is contracted before it is solved.
 
-Measured: of hulls of 4,000 to 25,000 faces, half moves the sides of one and twice those of one.
+Measured: half moves the sides of one hull (of 17,664 faces) by 44 % of the area, twice those of
+another (of 22,854 faces) by 50 %; the other hulls' stay.
 """
 
 COARSENINGS = 2

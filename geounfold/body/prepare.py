@@ -8,6 +8,9 @@ import numpy as np
 
 from geounfold.body.check import check_points
 from geounfold.body.lattice import Lattice, distinct, measure_lattice
+from geounfold.body.mending import MendingRecord, mend
+from geounfold.body.mending.mend import WORDS, Mended
+from geounfold.body.mending.record import MendedPlace, places_of
 from geounfold.body.noisy_lattice import disturbed_lattice
 from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
@@ -32,6 +35,8 @@ class PreparedPoints:
         The lattice of the blocks; None for scattered points and noisy grids.
     groups : tuple of (k,) int
         Rows of each body to unfold.
+    mended : MendingRecord
+        What was mended of these bodies.
     """
 
     points: Floats
@@ -39,6 +44,7 @@ class PreparedPoints:
     frame: Frame
     lattice: Lattice | None
     groups: tuple[Ints, ...]
+    mended: MendingRecord
 
     @property
     def chosen(self) -> int:
@@ -53,13 +59,16 @@ class BodyPoints:
     Attributes
     ----------
     fitted : (m, 3) float
-        The blocks that are fitted: moved onto their lattice, sub-blocks and gaps filled.
+        The blocks that are fitted: moved onto their lattice, sub-blocks and gaps filled, mended.
     blocks : (b, 3) float
         The blocks as given, which the map must contain.
+    mended : MendingRecord or None
+        What was mended of this body; None without a lattice.
     """
 
     fitted: Floats
     blocks: Floats
+    mended: MendingRecord | None = None
 
 
 def prepare(
@@ -90,11 +99,55 @@ def prepare(
     own = labels if cells is None else labels[cells.home]
     groups = select_body(points, own, body)
     given = frame.to_work(points)
-    bodies = [
-        BodyPoints(_sorted(work[labels == own[group[0]]]), _sorted(given[group]))
-        for group in groups
-    ]
-    return PreparedPoints(points, given, frame, lattice, groups), bodies
+    record = MendingRecord(np.zeros(len(points), np.int64))
+    home = np.arange(len(points)) if cells is None else cells.home
+    bodies = []
+    for group in groups:
+        rows = np.flatnonzero(labels == own[group[0]])
+        fitted, found = _mended(work[rows], rows, home, frame)
+        record = record if found is None else record.joined(found)
+        bodies.append(BodyPoints(_sorted(fitted), _sorted(given[group]), found))
+    return PreparedPoints(points, given, frame, lattice, groups, record), bodies
+
+
+def _mended(
+    fitted: Floats, rows: Ints, home: Ints, frame: Frame
+) -> tuple[Floats, MendingRecord | None]:
+    """Return the cells of a body mended, and what was mended; on no lattice they stay as they are.
+
+    Parameters
+    ----------
+    fitted : (m, 3) float
+        The body's cells, working units.
+    rows : (m,) int
+        Their rows among the cells of all bodies, rising.
+    home : (n,) int
+        For every point given, its row among the cells of all bodies.
+    frame : Frame
+        The working frame.
+    """
+    if frame.steps is None:
+        return fitted, None
+    cells = np.rint(fitted / frame.steps).astype(np.int64)
+    mended = mend(cells)
+    filled = mended.filled * frame.steps + 0.0
+    at = np.minimum(np.searchsorted(rows, home), len(rows) - 1)
+    own = np.where(rows[at] == home, at, -1)
+    found = MendingRecord.of(mended, own, _places(mended, cells, frame))
+    if not mended.changed:
+        return fitted, found
+    return np.concatenate([fitted[mended.fate == 0], filled]), found
+
+
+def _places(mended: Mended, cells: Ints, frame: Frame) -> tuple[MendedPlace, ...]:
+    """Return the places of all changes to a body, in the data's coordinates."""
+    changed = {"filled": mended.filled}
+    changed |= {word: cells[mended.fate == code] for code, word in enumerate(WORDS) if code}
+    return tuple(
+        place
+        for what, where in changed.items()
+        for place in places_of(what, where, frame.to_world(where * frame.steps))
+    )
 
 
 def _frame(points: Floats, filled: Floats, lattice: Lattice | None) -> Frame:

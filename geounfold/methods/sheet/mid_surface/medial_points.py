@@ -16,6 +16,7 @@ from geounfold.geometry.measures import (
     bilateral_normals,
     loop_turning,
     triangle_areas,
+    unique_edges,
     unit,
     vertex_normals,
     vertex_sum,
@@ -87,22 +88,58 @@ class MedialSheet:
         return replace(self, mesh=mesh, uv=self.uv * factor, half=self.half * factor)
 
 
+_SHORT = 0.25
+"""Share of the longest boundary loop's length up to which a loop is a hole, however it turns.
+
+Every loop of a tube runs around it, so its two ends are about as long as each other. Rough holes
+of a few faces turn by anything. Measured: 0.01 in a fold whose hinge has one, 1.0 in a tube.
+"""
+
+
 def _check_open(mesh: TriMesh) -> None:
-    """Raise NoSheetError if a surface closes on itself like a tube.
+    """Raise NoSheetError if a surface closes on itself like a tube, or has handles.
 
     A pierced sheet has several boundary loops too, but its outer loop turns by about 2 pi.  If a
     surface is closed around an axis, every loop runs around the axis and turns by about 0.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        Connected faces of one side of the hull.  Medial points do not serve: they crumple at tight
+        hinges, so that their loops turn by anything.
     """
     loops = boundary_loops(mesh.F)
+    _check_handles(mesh, len(loops))
     if len(loops) == 1:
         return
-    if loops and max(loop_turning(mesh.V, mesh.F, loop) for loop in loops) > np.pi:
+    length = np.array([_length(mesh.V[loop]) for loop in loops])
+    long = [loop for loop, own in zip(loops, length, strict=True) if own > _SHORT * length.max()]
+    if len(long) == 1:
+        return
+    if loops and max(loop_turning(mesh.V, mesh.F, loop) for loop in long) > np.pi:
         return
     what = "around an axis" if loops else "on all sides"
     raise NoSheetError(
         f"the layer closes on itself {what}, so it has no flat image without a cut; leave out a "
         "row of blocks along a cut, or unfold its parts one by one"
     )
+
+
+def _check_handles(mesh: TriMesh, loops: int) -> None:
+    """Raise NoSheetError if a connected surface with some boundary loops has handles."""
+    euler = len(mesh.V) - len(unique_edges(mesh.F)) + len(mesh.F)
+    handles = (2 - loops - euler) // 2
+    if loops and handles > 0:
+        raise NoSheetError(
+            f"the top of the layer has {handles} handles: parts of the body are joined by bridges "
+            "or pierced by waste; model the domain with a smoother boundary, or leave out the "
+            "blocks of the bridges"
+        )
+
+
+def _length(loop: Floats) -> float:
+    """Return the length of a closed polyline (k, 3)."""
+    return float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +250,7 @@ def medial_sheet(
     smooth = spd_solver(sp.eye_array(len(old)) + 2.0 * graph_laplacian(part.F, len(old)))
     inward = unit(smooth(vertex_normals(mesh.V, mesh.F)[old]))
     medial = TriMesh(part.V - half[:, None] * inward, part.F if outward else part.F[:, ::-1])
-    _check_open(medial)
+    _check_open(part)
     uv = flatten(medial, None)
     area = triangle_areas(mesh.V, mesh.F)
     at_vertices = unit(vertex_sum(normals * area[:, None], mesh.F, len(mesh.V)))

@@ -1,0 +1,175 @@
+"""What was mended in a run, for summary, warning and column: counts and places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geounfold.body.block_cells import connected
+from geounfold.body.mending.mend import WORDS, Mended
+from geounfold.geometry.mesh import Floats, Ints
+
+MOST_PLACES = 10
+"""Number of places that are told of each kind of change, the largest first."""
+
+_REACH = 1.8  # cells: distance within which changes are one place; a corner apart is 1.73
+
+
+@dataclass(frozen=True)
+class MendedPlace:
+    """Cells that were changed together.
+
+    Attributes
+    ----------
+    what : str
+        ``filled``, ``cut``, ``dropped`` or ``smoothed``.
+    cells : int
+        Their number.
+    at : (float, float, float)
+        The one nearest to their middle, in the data's coordinates.
+    """
+
+    what: str
+    cells: int
+    at: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class MendingRecord:
+    """What was mended of a run's bodies.
+
+    Attributes
+    ----------
+    fate : (n,) int
+        Index in `WORDS` for every point given; 0 if it is kept.
+    filled, cut, dropped, smoothed : int
+        Number of lattice cells.
+    handles_closed, handles_left : int
+        Number of handles.
+    places : tuple of MendedPlace
+        Largest first, at most `MOST_PLACES` of each kind and body.
+    """
+
+    fate: Ints
+    filled: int = 0
+    cut: int = 0
+    dropped: int = 0
+    smoothed: int = 0
+    handles_closed: int = 0
+    handles_left: int = 0
+    places: tuple[MendedPlace, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether any cell was filled or left out of the hull."""
+        return bool(self.filled or self.cut or self.dropped or self.smoothed)
+
+    @property
+    def column(self) -> np.ndarray:
+        """What became of every point: empty, cut, dropped or smoothed, (n,) of str."""
+        out: np.ndarray = np.array(WORDS, dtype=object)[self.fate]
+        return out
+
+    @classmethod
+    def of(cls, mended: Mended, rows: Ints, places: tuple[MendedPlace, ...]) -> MendingRecord:
+        """Return the record of one body.
+
+        Parameters
+        ----------
+        mended : Mended
+            What was mended of its cells.
+        rows : (n,) int
+            For every point given, its row among the body's cells; -1 if it is in none.
+        places : tuple of MendedPlace
+            Where.
+        """
+        return cls(
+            fate=np.where(rows >= 0, mended.fate[np.maximum(rows, 0)], 0),
+            filled=len(mended.filled),
+            cut=mended.count("cut"),
+            dropped=mended.count("dropped"),
+            smoothed=mended.count("smoothed"),
+            handles_closed=mended.handles_closed,
+            handles_left=mended.handles_left,
+            places=places,
+        )
+
+    def joined(self, other: MendingRecord) -> MendingRecord:
+        """Return the record of the bodies of both; every point is in one body at most."""
+        counts = ("filled", "cut", "dropped", "smoothed", "handles_closed", "handles_left")
+        return MendingRecord(
+            fate=np.maximum(self.fate, other.fate),
+            places=(*self.places, *other.places),
+            **{name: getattr(self, name) + getattr(other, name) for name in counts},
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return counts and places for the summary, ready for JSON."""
+        return {
+            "filled": self.filled,
+            "cut": self.cut,
+            "dropped": self.dropped,
+            "smoothed": self.smoothed,
+            "handles_closed": self.handles_closed,
+            "handles_left": self.handles_left,
+            "places": [
+                {"what": p.what, "cells": p.cells, "at": list(p.at)} for p in self.places
+            ],
+        }
+
+    def sentence(self) -> str:
+        """Return one sentence that says what was mended, how much and where; empty if nothing."""
+        told = []
+        if self.filled:
+            told.append(
+                f"{self.filled} cells inside the body were filled for the hull{self._at('filled')}"
+            )
+        for word, what in _LEFT_OUT.items():
+            count = getattr(self, word)
+            if count:
+                told.append(f"{count} blocks {what} were left out of it{self._at(word)}")
+        if self.handles_closed > 0:
+            told.append(f"{self.handles_closed} handles were closed so")
+        return ("; ".join(told) + "; every block is still carried") if told else ""
+
+    def _at(self, what: str) -> str:
+        place = next((p for p in self.places if p.what == what), None)
+        return "" if place is None else ", most around ({})".format(
+            ", ".join(f"{x:.6g}" for x in place.at)
+        )
+
+
+_LEFT_OUT = {
+    "cut": "of thin bridges",
+    "dropped": "away from the body",
+    "smoothed": "of a rough skin",
+}
+
+
+def places_of(what: str, cells: Ints, world: Floats) -> tuple[MendedPlace, ...]:
+    """Return the places of changed cells, the largest first.
+
+    Parameters
+    ----------
+    what : str
+        The change.
+    cells : (n, 3) int
+        Lattice cells.
+    world : (n, 3) float
+        Their centres in the data's coordinates.
+    """
+    if not len(cells):
+        return ()
+    pairs = cKDTree(cells).query_pairs(_REACH, output_type="ndarray")
+    group = connected(pairs[:, 0], pairs[:, 1], len(cells))
+    sizes = np.bincount(group)
+    out = []
+    for number in np.lexsort((np.arange(len(sizes)), -sizes))[:MOST_PLACES]:
+        mine = world[group == number]
+        nearest = mine[np.square(mine - mine.mean(axis=0)).sum(axis=1).argmin()]
+        x, y, z = nearest.tolist()
+        out.append(MendedPlace(what, len(mine), (x, y, z)))
+    return tuple(out)

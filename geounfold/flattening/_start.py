@@ -49,7 +49,10 @@ def check_disk(mesh: TriMesh) -> tuple[Ints, ...]:
     if missing and not backend.is_manifold(F):
         raise MeshError(NOT_MANIFOLD)
     if missing:
-        raise MeshError(f"the surface has {missing // 2} handle(s): cut it open to a disk first")
+        raise MeshError(
+            f"the surface has {missing // 2} handle(s), so it cannot be laid flat: take out the "
+            "faces of a bridge, or close the hole, of each"
+        )
     perimeter = [float(lengths(mesh.V, _cycle(loop)).sum()) for loop in loops]
     order = sorted(range(len(loops)), key=lambda k: (-perimeter[k], k))
     return tuple(loops[k] for k in order)

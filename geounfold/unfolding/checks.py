@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from geounfold.body.prepare import PreparedPoints
 from geounfold.errors import ControlMeshError, OptionError
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.mapping.carried import Carried, Returned
@@ -87,11 +88,14 @@ def check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
     )
 
 
-def check_placed(
-    groups: Sequence[Ints], folded: Floats, carried: Carried, options: UnfoldOptions
-) -> None:
-    """Raise ControlMeshError if blocks of a body have no image, unless that is allowed."""
-    rows = np.concatenate([group[~carried.placed[group]] for group in groups])
+def check_placed(prepared: PreparedPoints, carried: Carried, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError if blocks of a body have no image, unless that is allowed.
+
+    Blocks that mending left out of the hull may lie beyond the map's reach: they are left empty,
+    which is a warning.
+    """
+    folded, kept = prepared.points, prepared.mended.fate == 0
+    rows = np.concatenate([g[~carried.placed[g] & kept[g]] for g in prepared.groups])
     if not len(rows) or options.allow_uncertified:
         return
     where = ", ".join(f"{c:.6g}" for c in np.median(folded[rows], axis=0))

@@ -51,9 +51,13 @@ def fit(
 
     Raises
     ------
-    HullError, NoSheetError, SplitError, FlatteningError
+    NoSheetError
+        The body is too crude for a hull, or as the stages do.
+    HullError, SplitError, FlatteningError
         As the stages do.
     """
+    if body.mended is not None and reference is None:
+        body.mended.check()
     with stage("hull"):
         tried = _merges(body.fitted, frame, options, reference)
     for merge in tried:

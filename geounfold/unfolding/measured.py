@@ -73,7 +73,7 @@ def measure(
     with stage("certificate"):
         certificate = _certificate(mapping, carried, frame)
     check_certified(certificate, options)
-    check_placed(prepared.groups, P, carried, options)
+    check_placed(prepared, carried, options)
     with stage("quality"):
         quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
         torn = _torn(prepared.groups, prepared.work, carried, quality, frame)

@@ -90,6 +90,15 @@ class Unfolding:
         return self.carried.location
 
     @property
+    def mended(self) -> np.ndarray:
+        """What the hull made of every point, (n,) of str.
+
+        Empty if the point is the body's, ``cut`` in a thin bridge, ``dropped`` away from the
+        body, ``smoothed`` at a rough skin. Every point is carried all the same.
+        """
+        return self._record.prepared.mended.column
+
+    @property
     def columns(self) -> dict[str, Floats]:
         """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear."""
         return self.quality.blocks.columns()

@@ -100,6 +100,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "points": len(run.prepared.points),
         "bodies": len(run.fits),
         "lattice": _lattice(run),
+        "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
         "peak_memory_mb": peak_memory_mb(),
         "hull": _hull(run),
@@ -133,6 +134,8 @@ def warnings_of(run: RunRecord) -> list[str]:
             f"{counted(len(apart), 'point is', 'points are')} not part of the unfolded body, "
             f"{_first_place(run, apart)}; the map carries what it reaches"
         )
+    if run.prepared.mended.changed:
+        out.append(run.prepared.mended.sentence())
     count, outside, empty = len(run.prepared.points), run.outside, run.empty
     if outside > empty:
         out.append(

@@ -23,7 +23,14 @@ from geounfold.body.sub_blocks import FEWEST
 from geounfold.geometry.mesh import Bools, Ints
 
 CRUDE = 20
-"""Number of handles left above which a body is smoothed as a whole, and refused if it keeps them."""
+"""Number of handles above which a body is crude.
+
+Measured: 0 or 1 in 40 sound bodies, 8 in a layer with waste lenses, 9 in a split seam, 160 to 720
+in shells of interpolated indicators.
+"""
+
+FEW = 5
+"""Number of handles left above which a crude body is smoothed as a whole, and then refused."""
 
 STRAYS = 0.01
 """Share of stray cells above which a body with handles is smoothed as a whole.
@@ -97,7 +104,8 @@ def _without_handles(whole: Bools, handles: int) -> tuple[Bools, Bools, int]:
     """Return the body with its handles closed, the cells cut as bridges, and the handles left."""
     found = close_handles(whole, handles)
     cut = whole & ~found.body
-    if handles and (found.left > CRUDE or stray_share(found.body) > STRAYS):
+    crude = handles > CRUDE and found.left > FEW
+    if crude or (handles and stray_share(found.body) > STRAYS):
         even = smoothed(found.body)
         if even.any():
             even = fill_cavities(even)

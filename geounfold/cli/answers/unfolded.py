@@ -34,6 +34,8 @@ class UnfoldedBody:
         Of the result; what was read and carried is added.
     exploration : Exploration, optional
         Of a grade, for the summary and the report.
+    mended : bool
+        Whether the table gets the column ``mended``.
 
     Attributes
     ----------
@@ -49,7 +51,9 @@ class UnfoldedBody:
         body: BodyInputs,
         summary: Mapping[str, Any],
         exploration: Exploration | None = None,
+        mended: bool = False,
     ) -> None:
+        self._mended = mended
         self._result, self._body, self._exploration = result, body, exploration
         carry = flat_columns(result.map)
         self._samples = None if body.samples is None else carry(body.samples.points)
@@ -96,7 +100,7 @@ class UnfoldedBody:
     def _table_columns(self, frame: pd.DataFrame, points: Floats, rows: slice) -> dict[str, Any]:
         """Return the output columns of a batch of rows."""
         world = {} if self._body.frame is None else world_columns(points)
-        found = _results(self._result, rows)
+        found = _results(self._result, rows, self._mended)
         return {**world, **found, **self._body.volumes.columns(frame, found)}
 
     def _write_report(self, path: Path) -> None:
@@ -125,7 +129,8 @@ class UnfoldedBody:
         return found
 
 
-def _results(result: Unfolding, rows: slice) -> dict[str, Any]:
-    """Return the results of some of the blocks, by output column."""
+def _results(result: Unfolding, rows: slice, mended: bool = False) -> dict[str, Any]:
+    """Return the results of some of the blocks, by output column; with ``mended`` on request."""
     distortion = {name: values[rows] for name, values in result.columns.items()}
-    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion
+    asked = {"mended": result.mended[rows]} if mended else {}
+    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion | asked

@@ -18,6 +18,8 @@ from geounfold.cli.arguments.texts import ANGLES, FORMATS, HOLES, KEPT_ROWS, POI
 _DISTORTION = """\
   volume_ratio, nmd_error, stretch_min, stretch_max, shear
                    distortion of each block
+  mended           with --mended-column: cut, dropped or smoothed if the hull
+                   leaves the block out; else empty
   block_volume, unfolded_volume
                    if the blocks' sides are known: from --sizes, or from
                    columns called XINC, dx, size_x or alike"""
@@ -56,6 +58,12 @@ def add_unfold(commands: Any) -> Parser:
     group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
     group.add(
         "--mesh", metavar="C.vtu", rare=True, help="the control mesh in both spaces, flaws marked"
+    )
+    group.add(
+        "--mended-column",
+        action="store_true",
+        rare=True,
+        help="add the column mended: blocks that the hull leaves out",
     )
     group = parser.section("samples and drill-holes")
     group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")

@@ -47,7 +47,7 @@ def run(args: Namespace, console: Console) -> None:
         console.stage(f"exploring {args.grade}")
         explored = exploration(args, result, body.graded)
     console.stage("writing")
-    unfolded = UnfoldedBody(result, body, summary, explored)
+    unfolded = UnfoldedBody(result, body, summary, explored, args.mended_column)
     with outputs.writing() as parts:
         unfolded.write(parts)
     for warning in unfolded.warnings:

@@ -133,20 +133,20 @@ def _mended(
     filled = mended.filled * frame.steps + 0.0
     at = np.minimum(np.searchsorted(rows, home), len(rows) - 1)
     own = np.where(rows[at] == home, at, -1)
-    found = MendingRecord.of(mended, own, _places(mended, cells, frame))
+    found = MendingRecord.of(mended, own, _places(mended, cells, frame, frame.steps))
     if not mended.changed:
         return fitted, found
     return np.concatenate([fitted[mended.fate == 0], filled]), found
 
 
-def _places(mended: Mended, cells: Ints, frame: Frame) -> tuple[MendedPlace, ...]:
+def _places(mended: Mended, cells: Ints, frame: Frame, steps: Floats) -> tuple[MendedPlace, ...]:
     """Return the places of all changes to a body, in the data's coordinates."""
     changed = {"filled": mended.filled}
     changed |= {word: cells[mended.fate == code] for code, word in enumerate(WORDS) if code}
     return tuple(
         place
-        for what, where in changed.items()
-        for place in places_of(what, where, frame.to_world(where * frame.steps))
+        for what, moved in changed.items()
+        for place in places_of(what, moved, frame.to_world(moved * steps))
     )
 
 

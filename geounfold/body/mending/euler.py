@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from scipy import ndimage
 
-from geounfold.geometry.mesh import Bools, Ints
+from geounfold.geometry.mesh import Bools, Ints, Numbers
 
 CORNER = np.ones((3, 3, 3), dtype=bool)
 """Neighbours of a cell across faces, edges and corners."""
@@ -64,7 +64,7 @@ def handle_count(body: Bools) -> int:
     return int(pieces + cavities - euler_number(body))
 
 
-def euler_changes(before: Bools, after: Bools, piece: Ints, count: int) -> Ints:
+def euler_changes(before: Bools, after: Bools, piece: Numbers, count: int) -> Ints:
     """Return by how much each piece changes Euler's number, (count + 1,); entry 0 is 0.
 
     Parameters

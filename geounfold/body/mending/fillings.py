@@ -33,7 +33,7 @@ def fill_cavities(body: Bools) -> Bools:
 
 
 def fill_lenses(body: Bools) -> Bools:
-    """Return a body (i, j, k) with its waste lenses and pits filled.
+    """Return a body (i, j, k) with its waste lenses and pits filled; itself if it has none.
 
     What a closing by `WIDTHS` adds is judged piece by piece.
     """
@@ -45,5 +45,6 @@ def fill_lenses(body: Bools) -> Bools:
         solid, rest = (faces.sum(axis=1) for faces in pieces.faces)
         wanted = np.where(pieces.sizes < LEAST, solid >= 5 * rest, pieces.open_rim < OPEN_RIM)
         wanted &= pieces.sizes <= LARGEST_SHARE * body.sum()
-        body = pieces.with_chosen(wanted)
+        if wanted[1:].any():
+            body = pieces.with_chosen(wanted)
     return body

@@ -89,12 +89,14 @@ def mend(cells: Ints) -> Mended:
     box = VoxelBody.of(cells)
     if box is None or OccupiedCells.of(cells).usual_neighbours < FEWEST:
         return Mended(np.zeros((0, 3), np.int64), np.zeros(len(cells), np.int64), 0, 0)
-    whole = fill_lenses(fill_cavities(box.full))
-    before = handle_count(whole)
-    body, cut, left = _without_handles(whole, before)
+    solid = fill_cavities(box.full)
+    before = handle_count(solid)
+    whole = fill_lenses(solid)
+    handles = before if whole is solid else handle_count(whole)
+    body, cut, left = _without_handles(whole, handles)
     return Mended(
         filled=box.cells(body & ~box.full),
-        fate=box.at(cells, _fates(box.full, body, cut)),
+        fate=_fates(cells, box, body, cut),
         handles_closed=before - left,
         handles_left=left,
     )
@@ -114,12 +116,13 @@ def _without_handles(whole: Bools, handles: int) -> tuple[Bools, Bools, int]:
     return found.body, cut, found.left
 
 
-def _fates(given: Bools, body: Bools, cut: Bools) -> Ints:
-    """Return the index in `WORDS` of every cell of the box, (i, j, k)."""
-    fate = np.zeros(given.shape, np.int8)
-    lost = given & ~body
+def _fates(cells: Ints, box: VoxelBody, body: Bools, cut: Bools) -> Ints:
+    """Return the index in `WORDS` of every cell (n, 3); ``cut`` are the cells of bridges."""
+    fate = np.zeros(len(cells), np.int64)
+    lost = ~box.at(cells, body)
     if lost.any():
-        near = np.asarray(ndimage.binary_dilation(body, CORNER))
-        fate[lost] = np.where(near[lost], WORDS.index("smoothed"), WORDS.index("dropped"))
-        fate[lost & cut] = WORDS.index("cut")
+        out = cells[lost]
+        near = box.at(out, np.asarray(ndimage.binary_dilation(body, CORNER)))
+        word = np.where(near, WORDS.index("smoothed"), WORDS.index("dropped"))
+        fate[lost] = np.where(box.at(out, cut), WORDS.index("cut"), word)
     return fate

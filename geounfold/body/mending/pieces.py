@@ -1,4 +1,4 @@
-"""Pieces: connected cells that are added to a voxel body or taken away from it, judged one by one."""
+"""Connected cells that are added to a voxel body or taken away from it, judged piece by piece."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from geounfold.body.mending.euler import CORNER, euler_changes
-from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +27,14 @@ class Pieces:
     """
 
     body: Bools
-    number: Ints
+    number: Numbers
     count: int
 
     @classmethod
     def of(cls, body: Bools, cells: Bools) -> Pieces:
         """Return the pieces of cells (i, j, k), all of them in the body or all outside."""
         number, count = ndimage.label(cells, CORNER)
-        return cls(body, number, int(count))
+        return cls(body, np.asarray(number, np.int32), int(count))
 
     @cached_property
     def cells(self) -> Ints:
@@ -44,7 +44,7 @@ class Pieces:
     @cached_property
     def own(self) -> Ints:
         """Piece of each of ``cells``, (m,)."""
-        out: Ints = self.number.ravel()[self.cells]
+        out: Ints = self.number.ravel()[self.cells].astype(np.int64)
         return out
 
     @cached_property
@@ -69,7 +69,7 @@ class Pieces:
         """
         to_body, to_rest = (np.zeros((self.count + 1, 3), np.int64) for _ in range(2))
         number, body = self.number.ravel(), self.body.ravel()
-        i, j, k = self.number.shape
+        _, j, k = self.number.shape
         for axis, stride in enumerate((j * k, k, 1)):
             for step in (stride, -stride):
                 beside = self.cells + step

@@ -12,7 +12,7 @@ MARGIN = 6
 """Layers of empty cells around the body: more than the widest closing reaches."""
 
 LARGEST = 400_000_000
-"""Number of cells of a box up to which it is filled; a byte each, four while pieces are numbered."""
+"""Number of cells of a box up to which it is used; a cell takes up to five bytes."""
 
 
 @dataclass(frozen=True, eq=False)

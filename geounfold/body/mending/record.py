@@ -156,7 +156,7 @@ class MendingRecord:
             if count:
                 told.append(f"{count} blocks {what} were left out of the hull{self._at(word)}")
         if self.handles_closed > 0:
-            told.append(f"this closed {self.handles_closed} handles")
+            told.append(f"this closed {self.handles_closed} handle(s)")
         return "; ".join(told) if self.changed else ""
 
     def _at(self, what: str) -> str:

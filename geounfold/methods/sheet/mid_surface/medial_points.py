@@ -131,8 +131,8 @@ def _check_handles(mesh: TriMesh, loops: int) -> None:
     handles = (2 - loops - euler) // 2
     if loops and handles > 0:
         raise NoSheetError(
-            f"the top of the layer has {handles} handles: parts of the body are joined by bridges "
-            "or pierced by waste; model the domain with a smoother boundary, or leave out the "
+            f"the top of the layer has {handles} handle(s): bridges join parts of the body, or "
+            "waste pierces it; model the domain with a smoother boundary, or leave out the "
             "blocks of the bridges"
         )
 

@@ -51,20 +51,7 @@ def add_unfold(commands: Any) -> Parser:
     group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
     group.add("--bottom", metavar="B", help="the bottom surface")
     add_frame(group, "POINTS")
-    group = parser.section("outputs")
-    group.add("-o", "--output", metavar="OUT", required=True, help=f"the result: {POINTS}")
-    group.add("--summary", metavar="S.json", help="options, figures, proof, warnings, seconds")
-    group.add("--map", metavar="M.npz", help="the map, for `geounfold map`")
-    group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
-    group.add(
-        "--mesh", metavar="C.vtu", rare=True, help="the control mesh in both spaces, flaws marked"
-    )
-    group.add(
-        "--mended-column",
-        action="store_true",
-        rare=True,
-        help="add the column mended: blocks that the hull leaves out",
-    )
+    _add_outputs(parser)
     group = parser.section("samples and drill-holes")
     group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")
     group.add("--samples-out", metavar="Q", help="the carried samples, loose or of drill-holes")
@@ -96,3 +83,21 @@ def add_unfold(commands: Any) -> Parser:
         help="compare the control mesh with other meshes of its border",
     )
     return parser
+
+
+def _add_outputs(parser: Parser) -> None:
+    """Add the arguments for what is written."""
+    group = parser.section("outputs")
+    group.add("-o", "--output", metavar="OUT", required=True, help=f"the result: {POINTS}")
+    group.add("--summary", metavar="S.json", help="options, figures, proof, warnings, seconds")
+    group.add("--map", metavar="M.npz", help="the map, for `geounfold map`")
+    group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
+    group.add(
+        "--mesh", metavar="C.vtu", rare=True, help="the control mesh in both spaces, flaws marked"
+    )
+    group.add(
+        "--mended-column",
+        action="store_true",
+        rare=True,
+        help="add the column mended: blocks that the hull leaves out",
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending.mend import WORDS, Mended
 from geounfold.body.mending.record import MendedPlace, places_of
 from geounfold.body.noisy_lattice import disturbed_lattice
+from geounfold.body.parts.division import Division, divide
 from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
 from geounfold.body.sub_blocks import filled_cells
@@ -34,9 +35,11 @@ class PreparedPoints:
     lattice : Lattice or None
         The lattice of the blocks; None for scattered points and noisy grids.
     groups : tuple of (k,) int
-        Rows of each body to unfold.
+        Rows of each body to unfold, or of each sheet part of them.
     mended : MendingRecord
         What was mended of these bodies.
+    division : Division or None
+        The sheet parts; None if every body is one sheet.
     """
 
     points: Floats
@@ -45,6 +48,12 @@ class PreparedPoints:
     lattice: Lattice | None
     groups: tuple[Ints, ...]
     mended: MendingRecord
+    division: Division | None = None
+
+    @property
+    def bodies(self) -> int:
+        """Number of bodies to unfold."""
+        return len(self.groups) if self.division is None else int(self.division.body[-1]) + 1
 
     @property
     def chosen(self) -> int:
@@ -72,7 +81,7 @@ class BodyPoints:
 
 
 def prepare(
-    points: Floats, body: int | str | None = None
+    points: Floats, body: int | str | None = None, *, parts: bool = False
 ) -> tuple[PreparedPoints, list[BodyPoints]]:
     """Return the prepared points of the run, and those of each body.
 
@@ -82,6 +91,8 @@ def prepare(
         Finite centroids in the data's coordinates, any order and orientation.
     body : int, "all" or None
         The choice among separate bodies, as `select_body` takes it.
+    parts : bool
+        Whether bodies of several sheets are divided into these.
 
     Raises
     ------
@@ -107,7 +118,8 @@ def prepare(
         fitted, found = _mended(work[rows], rows, home, frame)
         record = record if found is None else record.joined(found)
         bodies.append(BodyPoints(_sorted(fitted), _sorted(given[group]), found))
-    return PreparedPoints(points, given, frame, lattice, groups, record), bodies
+    prepared = PreparedPoints(points, given, frame, lattice, groups, record)
+    return _divided(prepared, bodies) if parts else (prepared, bodies)
 
 
 def _mended(
@@ -148,6 +160,27 @@ def _places(mended: Mended, cells: Ints, frame: Frame, steps: Floats) -> tuple[M
         for what, moved in changed.items()
         for place in places_of(what, moved, frame.to_world(moved * steps))
     )
+
+
+def _divided(
+    prepared: PreparedPoints, bodies: list[BodyPoints]
+) -> tuple[PreparedPoints, list[BodyPoints]]:
+    """Return the points with sheet parts in place of the bodies that have several."""
+    division = divide([body.fitted for body in bodies], prepared.frame)
+    if division is None:
+        return prepared, bodies
+    chosen = np.sort(np.concatenate(prepared.groups))
+    part = division.cells.of(prepared.work[chosen])
+    rows = tuple(chosen[part == k] for k in range(division.count))
+    parts = [
+        replace(
+            bodies[number],
+            fitted=bodies[number].fitted[division.labels[number] == k],
+            blocks=_sorted(prepared.work[rows[k]]),
+        )
+        for k, number in enumerate(division.body.tolist())
+    ]
+    return replace(prepared, groups=rows, division=division), parts
 
 
 def _frame(points: Floats, filled: Floats, lattice: Lattice | None) -> Frame:

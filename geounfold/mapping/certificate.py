@@ -22,13 +22,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from geounfold.backends import igl as backend
 from geounfold.geometry.measures import boundary_faces, enclosed_volume
-from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints, TetMesh
 from geounfold.mapping.control_mesh import ControlMesh
 
 THEOREM = (
@@ -38,6 +39,13 @@ THEOREM = (
 )
 
 _NAMED = 50  # largest number of flaws listed one by one
+
+
+_COUNTS = (
+    *("tetrahedra", "boundary_faces", "inverted_folded", "inverted_unfolded"),
+    *("crossing_folded", "crossing_unfolded", "nested_folded", "nested_unfolded"),
+)
+"""Entries of a certificate that are sums over its parts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,6 +271,64 @@ class Certificate(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self.as_dict())
+
+
+def certify_parts(
+    control: ControlMesh, shell: ControlMesh | None, held: Ints, vertex_part: Ints
+) -> Certificate:
+    """Return the certificate of a map whose control meshes touch in the folded space.
+
+    Each part is proved by itself, on the numbers that carry its points. The flat images of the
+    parts must lie apart along x, which makes the map of all points one-to-one: no two parts have
+    an image in common, and a point belongs to one part.
+
+    Parameters
+    ----------
+    control, shell, held
+        As `certify` takes them, of all parts as one.
+    vertex_part : (n,) int
+        Part of each vertex.
+    """
+    whole, count = control if shell is None else shell, len(control.folded.T)
+    found, elements, reaches = [], [], []
+    for part in range(int(vertex_part.max()) + 1):
+        own = vertex_part == part
+        core = np.flatnonzero(own[control.folded.T[:, 0]])
+        rest = np.empty(0, np.int64)
+        if shell is not None:
+            rest = np.flatnonzero(own[shell.folded.T[:, 0]])
+        rows = np.concatenate([core, count + rest])
+        number = np.full(count + (0 if shell is None else len(shell.folded.T)) + 1, -1)
+        number[rows] = np.arange(len(rows))  # the last stays -1: no element
+        inner = _part_of(control, own[: len(control.folded.V)], core, own)
+        outer = None if shell is None or not len(rest) else _part_of(shell, own, rest, own)
+        found.append(certify(inner, outer, number[held]))
+        elements.append(rows[found[-1].elements])
+        x = whole.unfolded.V[own, 0]
+        reaches.append((float(x.min()), float(x.max())))
+    reaches.sort()
+    overlaps = sum(a[1] >= b[0] for a, b in pairwise(reaches))
+    sums = {name: sum(getattr(c, name) for c in found) for name in _COUNTS}
+    sums["crossing_unfolded"] += overlaps
+    return Certificate(
+        injective=all(c.injective for c in found) and not overlaps,
+        glued=all(c.glued for c in found),
+        elements=np.concatenate(elements),
+        blocks=np.concatenate([c.blocks for c in found]),
+        folded=np.concatenate([c.folded for c in found]),
+        unfolded=np.concatenate([c.unfolded for c in found]),
+        **sums,
+    )
+
+
+def _part_of(mesh: ControlMesh, vertices: Bools, tets: Ints, own: Bools) -> ControlMesh:
+    """Return some tetrahedra of a mesh on some of its vertices; ``own`` numbers these."""
+    T = (np.cumsum(own) - 1)[mesh.folded.T[tets]]
+    return ControlMesh(
+        TetMesh(mesh.folded.V[vertices], T),
+        TetMesh(mesh.unfolded.V[vertices], T),
+        mesh.stratigraphic[vertices],
+    )
 
 
 def certify(control: ControlMesh, shell: ControlMesh | None, held: Ints) -> Certificate:

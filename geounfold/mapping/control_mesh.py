@@ -136,6 +136,17 @@ def side_by_side(
     return joined, _from_table(np.concatenate([table, *rest]), np.concatenate(shells))
 
 
+def vertex_parts(parts: Sequence[tuple[ControlMesh, ControlMesh | None]]) -> Ints:
+    """Return the number of the mesh that each vertex of `side_by_side` comes from, (n,)."""
+    inner = [len(control.folded.V) for control, _ in parts]
+    extra = [
+        0 if shell is None else len(shell.folded.V) - n
+        for (_, shell), n in zip(parts, inner, strict=True)
+    ]
+    number = np.arange(len(parts))
+    return np.concatenate([np.repeat(number, inner), np.repeat(number, extra)])
+
+
 def _from_table(table: Floats, T: Ints) -> ControlMesh:
     """Return a control mesh from rows of folded, unfolded and stratigraphic coordinates."""
     return ControlMesh(TetMesh(table[:, :3], T), TetMesh(table[:, 3:6], T), table[:, 6])

@@ -31,9 +31,11 @@ from numpy.typing import NDArray
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 OLDEST = 2
 """Oldest version that can be read."""
+
+_UNDIVIDED = 3  # version written for bodies that are not divided into sheet parts
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -98,10 +100,18 @@ ARRAYS: Mapping[str, Layout] = {
     "coordinates": Layout(
         _INDEX, (), holds=lambda a: bool(0 <= a <= 2), must="be 0, 1 or 2 (tet, wachspress, mvc)"
     ),
+    "vertex_part": Layout(_INDEX, ("parted?",), below="vertices"),
+    "part_cells": Layout(_INDEX, ("cells?", 3)),
+    "cell_part": Layout(_INDEX, ("cells?",), below="vertices"),
 }
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
 
-ADDED: Mapping[str, tuple[int, Any]] = {"coordinates": (3, 0)}
+ADDED: Mapping[str, tuple[int, Any]] = {
+    "coordinates": (3, 0),
+    "vertex_part": (4, np.zeros(0)),
+    "part_cells": (4, np.zeros((0, 3))),
+    "cell_part": (4, np.zeros(0)),
+}
 """Arrays added later: the first version that has each, and its value in older files."""
 
 _HEAD: Mapping[str, Layout] = {
@@ -136,7 +146,8 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
     path : path or binary stream
         Destination.
     arrays : dict of arrays
-        The arrays of ARRAYS, of any type that converts without loss.
+        The arrays of ARRAYS, of any type that converts without loss; without those on parts for
+        bodies that are not divided, whose file is of the version before.
 
     Raises
     ------
@@ -148,9 +159,11 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
         for name, layout in ARRAYS.items()
         if name in arrays
     }
-    _check_names({*arrays}, {*ARRAYS}, "the map")
-    _check_arrays(exact, "the map")
-    whole = {"format": np.array(FORMAT), "version": np.array(FORMAT_VERSION, "<i8"), **exact}
+    version = FORMAT_VERSION if "vertex_part" in arrays else _UNDIVIDED
+    late = {n for n, (first, _) in ADDED.items() if first > version}
+    _check_names({*arrays}, {*ARRAYS} - late, "the map")
+    _check_arrays({**exact, **_left_out(late)}, "the map")
+    whole = {"format": np.array(FORMAT), "version": np.array(version, "<i8"), **exact}
     stream = io.BytesIO()
     np.savez_compressed(stream, **whole, checksum=np.array(_checksum(whole)))  # type: ignore[arg-type]
     if isinstance(path, str | os.PathLike):
@@ -203,9 +216,14 @@ def read_arrays(path: str | Path) -> Arrays:
     stored = rest.pop("checksum")
     if str(stored) != _checksum({**head, **rest}):
         raise InputError(f"{path}: the map file is damaged (checksum differs); save it again")
-    rest.update({n: np.array(ADDED[n][1], ARRAYS[n].dtype) for n in late})
+    rest.update(_left_out(late))
     _check_arrays(rest, str(path))
     return rest
+
+
+def _left_out(names: set[str]) -> Arrays:
+    """Return what arrays are that a version does not have."""
+    return {n: np.array(ADDED[n][1], ARRAYS[n].dtype) for n in names}
 
 
 def _content(path: Path) -> bytes:

@@ -20,6 +20,7 @@ from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients
 from geounfold.mapping.map_file import read_arrays, write_arrays
 from geounfold.mapping.mesh_space import MeshImage, MeshSpace
+from geounfold.mapping.parts_space import MapParts, PartsSpace
 from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
 
 REACH = 3.0
@@ -55,6 +56,9 @@ class UnfoldingMap:
         ``tet``: the map is affine in every tetrahedron.  ``wachspress`` or ``mvc``: points in
         prisms are carried by coordinates of the prism's corners, smooth inside; the inverse is
         found by Newton's method to 1e-12 of the mesh's size.
+    parts : MapParts, optional
+        The parts of a map whose control mesh is several that touch: each folded point is carried
+        by the mesh of its own part.
 
     Raises
     ------
@@ -70,6 +74,7 @@ class UnfoldingMap:
         reach: float = REACH,
         known: Sequence[TetIndex] = (),
         coordinates: str = "tet",
+        parts: MapParts | None = None,
     ) -> None:
         check_one_of("coordinates", coordinates, COORDINATES)
         self.coordinates = coordinates
@@ -77,11 +82,14 @@ class UnfoldingMap:
         self.control = control
         self.shell = shell
         self.reach = reach
+        self.parts = parts
         self._known = tuple(known)
 
     @cached_property
-    def _folded(self) -> MeshSpace:
+    def _folded(self) -> MeshSpace | PartsSpace:
         shell = None if self.shell is None else self.shell.folded
+        if self.parts is not None:
+            return PartsSpace(self.control.folded, shell, self.reach, self.parts)
         return MeshSpace(self.control.folded, shell, self.reach, self._known)
 
     @cached_property
@@ -151,7 +159,7 @@ class UnfoldingMap:
             out.element[rows] = place
 
         def walk(rows: slice) -> None:
-            place, weights = space.walk.locate(*self._to_work(P[rows], inverse=inverse))
+            place, weights = space.walked(*self._to_work(P[rows], inverse=inverse))
             fill(rows, place, list(weights))
             out.inside[rows] = out.placed[rows] = place >= 0
 
@@ -294,6 +302,7 @@ class UnfoldingMap:
             "tetrahedra": self.control.folded.T,
             "shell": whole.folded.T[count:],
             "stratigraphic": whole.stratigraphic,
+            **({} if self.parts is None else self.parts.arrays()),
         }
 
 
@@ -325,4 +334,11 @@ def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:
     if len(S):
         shell = ControlMesh(TetMesh(whole[0], S), TetMesh(whole[1], S), whole[2])
     coordinates = COORDINATES[int(arrays["coordinates"])]
-    return UnfoldingMap(frame, control, shell, float(arrays["reach"]), coordinates=coordinates)
+    return UnfoldingMap(
+        frame,
+        control,
+        shell,
+        float(arrays["reach"]),
+        coordinates=coordinates,
+        parts=MapParts.of_arrays(arrays, frame.steps),
+    )

@@ -18,7 +18,7 @@ TOUCHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
+class Place:
     """Location of points in one space, as in Carried, and barycentric coordinates (n, 4)."""
 
     element: Ints
@@ -114,7 +114,11 @@ class MeshSpace:
     def _shell_index(self) -> TetIndex | None:
         return None if self._shell is None else TetIndex(self._shell.V, self._shell.T)
 
-    def locate(self, points: Floats) -> _Place:
+    def walked(self, x: Floats, y: Floats, z: Floats) -> tuple[Numbers | Ints, Floats]:
+        """Return the tetrahedra to which walks lead, as TetWalk.locate returns them."""
+        return self.walk.locate(x, y, z)
+
+    def locate(self, points: Floats) -> Place:
         """Return the location of points (n, 3) by the reference index, libigl's."""
         element = self._index.locate(points)
         inside = element >= 0
@@ -130,7 +134,7 @@ class MeshSpace:
             around = missed[~near]
             element[around] = self._around(points[around], away[~near], owner[~near])
         corners = self._T[np.maximum(element, 0)]
-        return _Place(element, inside, distance, barycentric_in_tets(points, self._V, corners))
+        return Place(element, inside, distance, barycentric_in_tets(points, self._V, corners))
 
     def _around(self, points: Floats, away: Floats, owner: Ints) -> Ints:
         """Return the elements that carry points outside the control mesh, -1 for none."""

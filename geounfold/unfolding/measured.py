@@ -11,7 +11,7 @@ from geounfold.body.prepare import PreparedPoints
 from geounfold.body.working_frame import Frame
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.mapping.carried import Carried, Returned
-from geounfold.mapping.certificate import Certificate, certify
+from geounfold.mapping.certificate import Certificate, certify, certify_parts
 from geounfold.mapping.control_mesh import ControlMesh, scaled
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.methods import PointwiseMap
@@ -113,7 +113,10 @@ def _certificate(
     """Return what is proved of a map, places in the data's coordinates and unit."""
     if isinstance(mapping, PointwiseMap):
         return Certificate.unproved(mapping.fault)
-    return _in_data(certify(mapping.control, mapping.shell, carried.element), frame)
+    control, shell, held = mapping.control, mapping.shell, carried.element
+    if mapping.parts is None:
+        return _in_data(certify(control, shell, held), frame)
+    return _in_data(certify_parts(control, shell, held, mapping.parts.vertex), frame)
 
 
 def _quality(
@@ -130,6 +133,11 @@ def _quality(
     world, whole = (in_world(mesh, frame) for mesh in (mapping.control, mapping.whole))
     gradients = _gradients(mapping, P, carried)
     cells = frame.cells(given)
+    if mapping.parts is not None:  # blocks of different parts are no neighbours
+        part = mapping.parts.cells.of(given)
+        P = P + part[:, None] * np.array([4 * float(np.ptp(P[:, 0])), 0.0, 0.0])
+        if cells is not None:
+            cells = cells + part[:, None] * np.array([4 * (int(np.ptp(cells[:, 0])) + 1), 0, 0])
     lattice = None if cells is None or frame.steps is None else (cells, frame.steps)
     return assess(world, whole, carried.element, P, carried.points, k, gradients, lattice)
 

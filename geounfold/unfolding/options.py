@@ -27,12 +27,16 @@ from geounfold.surfaces.hull import HULLS, HullOptions
 from geounfold.surfaces.split import SPLITS
 from geounfold.unfolding.gone_options import gone
 
+PARTS = ("auto", "one")
+"""Whether bodies of several sheets are divided into these, or taken as one sheet each."""
+
 VALID: dict[str, tuple[str, ...]] = {
     "method": tuple(METHODS),
     "flattener": tuple(FLATTENERS),
     "hull": ("auto", *HULLS),
     "split": tuple(SPLITS),
     "datum": DATUMS,
+    "parts": PARTS,
     "coordinates": COORDINATES,
 }
 """Valid values of the options that take a name."""
@@ -73,6 +77,8 @@ class UnfoldOptions:
         Surface that becomes flat: ``mid``, ``top``, ``bottom`` or ``proportional`` (both).
     body : int, "all" or None
         Body to unfold if there are several, 0 the largest; None if there is one.
+    parts : str
+        ``auto`` fits each sheet of a branched, split or repeated body; ``one`` fits one to all.
     coordinates : str
         What carries points between the control mesh's vertices: its tetrahedra (``tet``), proved
         one-to-one, or its prisms (``wachspress``, ``mvc``), smooth inside but not proved.
@@ -117,6 +123,7 @@ class UnfoldOptions:
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     datum: str = "mid"
     body: int | str | None = None
+    parts: str = "auto"
     coordinates: str = "tet"
     neighbours: int = NEIGHBOURS
     reach: float = REACH

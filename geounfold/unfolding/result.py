@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, overload
 import numpy as np
 import pandas as pd
 
+from geounfold.body.parts import Junction
 from geounfold.errors import OptionError
-from geounfold.geometry.mesh import Floats, Space, TriMesh, in_space
+from geounfold.geometry.mesh import Floats, Ints, Space, TriMesh, in_space
 from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, with_carried
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
@@ -88,6 +89,22 @@ class Unfolding:
     def location(self) -> np.ndarray:
         """``inside``, ``extrapolated`` or ``outside`` (empty) for every point, (n,) of str."""
         return self.carried.location
+
+    @cached_property
+    def body_part(self) -> Ints:
+        """Sheet part of every point, (n,), 0 the largest of its body; -1 outside the bodies.
+
+        Parts are numbered over all bodies to unfold. A body of one sheet is one part.
+        """
+        out = np.full(len(self.folded), -1)
+        for part, rows in enumerate(self._record.prepared.groups):
+            out[rows] = part
+        return out
+
+    @property
+    def junctions(self) -> tuple[Junction, ...]:
+        """Places where sheet parts meet, in the data's coordinates; empty for whole bodies."""
+        return self._record.junctions
 
     @property
     def mended(self) -> np.ndarray:
@@ -280,7 +297,7 @@ class Unfolding:
     def _facts(self) -> Facts:
         return Facts(
             points=len(self.folded),
-            bodies=len(self.fits),
+            bodies=self._record.prepared.bodies,
             outside=self._record.outside,
             method=self.options.method,
             faults=self._record.faults,

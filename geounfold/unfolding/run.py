@@ -12,15 +12,17 @@ import numpy as np
 import pandas as pd
 
 from geounfold.backends.blas import one_thread
-from geounfold.body.prepare import prepare
+from geounfold.body.parts.division import Division
+from geounfold.body.prepare import PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
-from geounfold.errors import InputError
+from geounfold.errors import GeounfoldError, InputError
 from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
 from geounfold.mapping.carried import checked_points
 from geounfold.mapping.certificate import certify
-from geounfold.mapping.control_mesh import side_by_side
+from geounfold.mapping.control_mesh import side_by_side, vertex_parts
 from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.mapping.parts_space import MapParts
 from geounfold.methods import METHODS, BodyFit, PointwiseMap
 from geounfold.unfolding.checks import check_method, check_single
 from geounfold.unfolding.fit_body import fit
@@ -102,16 +104,33 @@ def unfold(
     check_method(chosen)
     clock = _Clock(progress)
     with clock.stage("frame"):
-        prepared, bodies = prepare(_coordinates(points), chosen.body)
+        divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
+        prepared, bodies = prepare(_coordinates(points), chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
     reference = _reference(top, bottom, prepared.frame)
-    fits = [fit(body, prepared.frame, chosen, reference, clock.stage) for body in bodies]
+    fits = []
+    for part, body in enumerate(bodies):
+        with _named(prepared.division, part):
+            fits.append(fit(body, prepared.frame, chosen, reference, clock.stage))
     del bodies  # as large as the points, and not needed any more
     with clock.stage("map"):
-        mapping = _one_map(fits, prepared.frame, chosen)
+        mapping = _one_map(fits, prepared, chosen)
     measured = measure(mapping, prepared, chosen, clock.stage)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
     return Unfolding(record, points if isinstance(points, pd.DataFrame) else None)
+
+
+@contextmanager
+def _named(division: Division | None, part: int) -> Iterator[None]:
+    """Give an error that ends the fit of a sheet part the part's name and its junctions."""
+    try:
+        yield
+    except GeounfoldError as error:
+        if division is None:
+            raise
+        raise type(error)(
+            f"{division.named(part)}: {error}; --parts one fits one sheet to the whole body"
+        ) from error
 
 
 def _coordinates(points: Floats | pd.DataFrame) -> Floats:
@@ -136,18 +155,23 @@ def _reference(
 
 
 def _one_map(
-    fits: list[BodyFit], frame: Frame, options: UnfoldOptions
+    fits: list[BodyFit], prepared: PreparedPoints, options: UnfoldOptions
 ) -> UnfoldingMap | PointwiseMap:
-    """Return the map of all bodies, without shells if these overlap."""
+    """Return the map of all bodies, without shells if these overlap.
+
+    Shells of sheet parts may overlap, because each point is carried by its own part's.
+    """
+    frame, division = prepared.frame, prepared.division
     rules = [(f.rule, f.points) for f in fits if f.rule is not None and f.points is not None]
     if rules:
         return PointwiseMap(options.method, frame, *rules[0], options.reach)
     reach = METHODS[options.method].reach
     meshes = [(f.control, f.shell) for f in fits if f.control is not None]
     control, shell = side_by_side(meshes)
-    if len(fits) > 1 and shell is not None:
+    parts = None if division is None else MapParts(vertex_parts(meshes), division.cells)
+    if len(fits) > 1 and shell is not None and parts is None:
         none = np.empty(0, np.int64)
         if not certify(control, shell, none).injective:
             control, shell = side_by_side([(control, None) for control, _ in meshes])
     reach = options.reach if reach is None else reach
-    return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates)
+    return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates, parts=parts)

@@ -12,6 +12,7 @@ from geounfold._version import __version__
 from geounfold.backends.igl import boundary_loops, is_manifold
 from geounfold.backends.memory import peak_memory_mb
 from geounfold.body.check import count_duplicates
+from geounfold.body.parts import Junction
 from geounfold.body.prepare import PreparedPoints
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
@@ -75,6 +76,12 @@ class RunRecord:
         return None if returned is None else returned.largest
 
     @property
+    def junctions(self) -> tuple[Junction, ...]:
+        """Places where sheet parts meet, in the data's coordinates."""
+        division = self.prepared.division
+        return () if division is None else division.junctions
+
+    @property
     def injective(self) -> bool:
         """Whether the map is proved one-to-one; the certificate covers tetrahedra only."""
         return self.measured.certificate.injective and self.map.prisms is None
@@ -98,7 +105,9 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "options": run.options.as_dict(),
         "config": to_toml(run.options),
         "points": len(run.prepared.points),
-        "bodies": len(run.fits),
+        "bodies": run.prepared.bodies,
+        "parts": _parts(run),
+        "junctions": [_junction(j) for j in run.junctions],
         "lattice": _lattice(run),
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
@@ -136,6 +145,7 @@ def warnings_of(run: RunRecord) -> list[str]:
         )
     if run.prepared.mended.changed:
         out.append(run.prepared.mended.sentence())
+    out += [_told(junction) for junction in run.junctions]
     count, outside, empty = len(run.prepared.points), run.outside, run.empty
     if outside > empty:
         out.append(
@@ -171,6 +181,42 @@ def _first_place(run: RunRecord, rows: Ints) -> str:
     """Return words that name the coordinates of the first of some points."""
     place = ", ".join(f"{c:.10g}" for c in run.prepared.points[rows[0]])
     return f"{'at' if len(rows) == 1 else 'the first at'} ({place})"
+
+
+def _told(junction: Junction) -> str:
+    """Return the warning of a junction."""
+    if junction.kind == "pipe":
+        return f"{junction.sentence}; its blocks were carried with the sheet, check them"
+    return f"{junction.sentence}; each was unfolded by itself, and stratigraphic is per part"
+
+
+def _parts(run: RunRecord) -> list[dict[str, Any]]:
+    """Return a row per sheet part; none if every body is one sheet."""
+    division = run.prepared.division
+    if division is None:
+        return []
+    placed = run.measured.carried.placed
+    return [
+        {
+            "part": part,
+            "body": int(division.body[part]),
+            "blocks": len(rows),
+            "thickness": float(division.thickness[part]),
+            "empty": int((~placed[rows]).sum()),
+            "outcome": "proved" if run.injective else "not proved",
+        }
+        for part, rows in enumerate(run.prepared.groups)
+    ]
+
+
+def _junction(junction: Junction) -> dict[str, Any]:
+    return {
+        "kind": junction.kind,
+        "parts": list(junction.parts),
+        "place": list(junction.place),
+        "thickness": list(junction.thickness),
+        "sentence": junction.sentence,
+    }
 
 
 def _lattice(run: RunRecord) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -36,6 +36,8 @@ class UnfoldedBody:
         Of a grade, for the summary and the report.
     mended : bool
         Whether the table gets the column ``mended``.
+    part : bool
+        Whether the table gets the column ``body_part`` also if no body is divided.
 
     Attributes
     ----------
@@ -52,8 +54,10 @@ class UnfoldedBody:
         summary: Mapping[str, Any],
         exploration: Exploration | None = None,
         mended: bool = False,
+        part: bool = False,
     ) -> None:
-        self._mended = mended
+        columns = {"mended": mended, "body_part": part or bool(result.junctions)}
+        self._asked = [name for name, wanted in columns.items() if wanted]
         self._result, self._body, self._exploration = result, body, exploration
         carry = flat_columns(result.map)
         self._samples = None if body.samples is None else carry(body.samples.points)
@@ -100,7 +104,7 @@ class UnfoldedBody:
     def _table_columns(self, frame: pd.DataFrame, points: Floats, rows: slice) -> dict[str, Any]:
         """Return the output columns of a batch of rows."""
         world = {} if self._body.frame is None else world_columns(points)
-        found = _results(self._result, rows, self._mended)
+        found = _results(self._result, rows, self._asked)
         return {**world, **found, **self._body.volumes.columns(frame, found)}
 
     def _write_report(self, path: Path) -> None:
@@ -113,7 +117,7 @@ class UnfoldedBody:
             self.summary,
             table.points,
             result.points,
-            report_columns(table, _results(result, slice(0, len(table)))),
+            report_columns(table, _results(result, slice(0, len(table)), self._asked)),
             holes=report_holes(body.holes, self._holes, body.samples, self._samples),
             exploration=self._exploration,
         )
@@ -129,8 +133,8 @@ class UnfoldedBody:
         return found
 
 
-def _results(result: Unfolding, rows: slice, mended: bool = False) -> dict[str, Any]:
-    """Return the results of some of the blocks, by output column; with ``mended`` on request."""
+def _results(result: Unfolding, rows: slice, asked: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the results of some of the blocks, by output column; ``asked``: columns on request."""
     distortion = {name: values[rows] for name, values in result.columns.items()}
-    asked = {"mended": result.mended[rows]} if mended else {}
-    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion | asked
+    asked_for = {name: getattr(result, name)[rows] for name in asked}
+    return result_columns(UNFOLDED, result.carried.part(rows)) | distortion | asked_for

@@ -120,6 +120,7 @@ _METHOD = (
     ("datum", "D", False, "flat surface: mid (default), top, bottom or proportional: both"),
     ("up", "X,Y,Z", False, "direction of the top (hanging wall) (default 0,0,1)"),
     ("body", "N", False, "which of several separate bodies, 0 the largest, or all"),
+    ("parts", "P", False, "sheets of a branched body: auto (default) or one"),
     ("flattener", "F", True, "spring (default) or another; `geounfold compare` tries all"),
     (
         *("hull", "H", True),

@@ -20,6 +20,8 @@ _DISTORTION = """\
                    distortion of each block
   mended           with --mended-column: cut, dropped or smoothed if the hull
                    leaves the block out; else empty
+  body_part        if a body has several sheets, or with --part-column: sheet
+                   of each block, 0 the largest; -1 outside the bodies
   block_volume, unfolded_volume
                    if the blocks' sides are known: from --sizes, or from
                    columns called XINC, dx, size_x or alike"""
@@ -100,4 +102,7 @@ def _add_outputs(parser: Parser) -> None:
         action="store_true",
         rare=True,
         help="add the column mended: blocks that the hull leaves out",
+    )
+    group.add(
+        "--part-column", action="store_true", rare=True, help="add the column body_part always"
     )

@@ -47,7 +47,9 @@ def run(args: Namespace, console: Console) -> None:
         console.stage(f"exploring {args.grade}")
         explored = exploration(args, result, body.graded)
     console.stage("writing")
-    unfolded = UnfoldedBody(result, body, summary, explored, args.mended_column)
+    unfolded = UnfoldedBody(
+        result, body, summary, explored, mended=args.mended_column, part=args.part_column
+    )
     with outputs.writing() as parts:
         unfolded.write(parts)
     for warning in unfolded.warnings:

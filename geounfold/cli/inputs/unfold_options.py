@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 MODEL_OPTIONS = (
     *("method", "flattener", "hull", "split", "up", "datum", "coordinates", "body"),
-    *("neighbours", "reach"),
+    *("parts", "neighbours", "reach"),
 )
 """The options of `UnfoldOptions` that have a flag of the same name and a value."""
 

@@ -16,6 +16,7 @@ PYTEST_ARGS ?=
 BENCH_ARGS ?=
 SCALE_ARGS ?=
 SOAK_ARGS ?=
+FIELD_ARGS ?=
 RUNS ?= 10
 STUDY_ARGS ?=
 
@@ -71,8 +72,9 @@ bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 	$(BIN)/python tests/benchmarks/scale.py --page --profile $(SCALE_ARGS)
 
-soak: $(STAMP)  ## unfold 1,000 random bodies, 30 minutes at most; continues a stopped run
+soak: $(STAMP)  ## unfold 1,000 random bodies, 30 minutes at most, and the field suite, 15 minutes
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
+	$(BIN)/python tests/soak/field.py $(FIELD_ARGS)
 
 study: $(STAMP)  ## krige in folded, unfolded and true space, 30 minutes; continues a stopped run
 	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)

@@ -46,6 +46,20 @@ def _shell(
     return space.body((value > np.quantile(value, 1 - share), np.nan), loose=bits)
 
 
+def _own_level(t: Floats, kept: Bools) -> Floats:
+    """Return the level between the lowest and the highest cell of each column of a body.
+
+    The true level is that of the smooth layer behind the noise. An answer that follows the noisy
+    surfaces instead is as right.
+    """
+    half = np.abs(np.diff(t, axis=2)).mean() / 2
+    low = np.where(kept, t, np.inf).min(axis=2, keepdims=True) - half
+    high = np.where(kept, t, -np.inf).max(axis=2, keepdims=True) + half
+    with np.errstate(invalid="ignore"):
+        out: Floats = (t - low) / (high - low)
+    return out
+
+
 def _lens_shell(rng: np.random.Generator, noise: float, bits: bool = False) -> FieldBlocks:
     """Return a grade shell of a folded lens: a noisy grade falls off from its mid surface."""
     space = Space((-300, -220, -70), (300, 220, 70), (10.0, 10.0, 5.0))
@@ -54,7 +68,8 @@ def _lens_shell(rng: np.random.Generator, noise: float, bits: bool = False) -> F
     t = space.z - relief(rng, x, y, 0.15)
     grade = 1 - np.abs(t) / half + noise * space.noise(rng, (2.0, 2.0, 1.5))
     level = np.where(np.abs(t) < half, 0.5 + t / (2 * half), np.nan)
-    return space.body((grade > 0, level), loose=bits)
+    kept = (grade > 0) & space.inside
+    return space.body((kept, level), loose=bits, others=(_own_level(t, kept),))
 
 
 def _indicator(
@@ -87,7 +102,9 @@ def _indicator(
     t = space.z - relief(rng, space.x, space.y, 0.3)
     value = 1 - np.abs(t - 20) / 20 + noise * space.noise(rng, (correlation,) * 3)
     level = np.where((t > 0) & (t < 40), t / 40, np.nan)
-    return space.body(((value > 0) & (t > -40) & (t < 80), level), loose=bits)
+    kept = (value > 0) & (t > -40) & (t < 80) & space.inside
+    kept = kept if bits else largest(kept)
+    return space.body((kept, level), loose=bits, others=(_own_level(t, kept),))
 
 
 def _polygons(rng: np.random.Generator) -> FieldBlocks:
@@ -95,11 +112,14 @@ def _polygons(rng: np.random.Generator) -> FieldBlocks:
     space = Space((-240, -160, -60), (240, 160, 110))
     x, y = space.x, space.y
     holes = rng.uniform((-260, -180), (260, 180), (90, 2))
-    surface = relief(rng, holes[:, 0], holes[:, 1], 0.25)
+    at = np.concatenate([holes, np.stack([x, y], axis=-1).reshape(-1, 2)])
+    height = relief(rng, at[:, 0], at[:, 1], 0.15)
+    surface, layer = height[: len(holes)], height[len(holes) :].reshape(x.shape)
     low, high = rng.normal(0, 2.5, (2, len(holes))) + np.array([surface, surface + 35])
     near = cKDTree(holes).query(np.stack([x, y], axis=-1))[1]
     level = (space.z - low[near]) / (high - low)[near]
-    return space.body(((level > 0) & (level < 1), level))
+    smooth = np.clip((space.z - layer) / 35, 0, 1)
+    return space.body(((level > 0) & (level < 1), level), others=(smooth,))
 
 
 def _layer(rng: np.random.Generator, thick: float = 40.0) -> tuple[Space, Floats, Bools]:
@@ -212,7 +232,7 @@ BODIES = (
     _body("shell_150k", "shell",
           partial(_shell, cells=(120, 90, 36), reach=(9.0, 9.0, 3.0), share=0.36),
           "random field, 150,000 blocks", "told"),
-    _body("lens_shell", "shell", partial(_lens_shell, noise=0.25), "grade shell of a lens"),
+    _body("lens_shell", "shell", partial(_lens_shell, noise=0.2), "grade shell of a lens"),
     _body("lens_shell_rough", "shell", partial(_lens_shell, noise=0.6, bits=True),
           "grade shell of a lens, rough, with bits", "told"),
     _body("indicator_02", "indicator", partial(_indicator, noise=0.2), "noise 0.2"),

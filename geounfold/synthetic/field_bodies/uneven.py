@@ -103,7 +103,8 @@ def _trough(rng: np.random.Generator, slope: float, cut: float) -> FieldBlocks:
 def _strip(rng: np.random.Generator, breadth: float) -> FieldBlocks:
     """Return a long sheet, ``breadth`` times as broad as thick."""
     half = 15.0 * breadth
-    space = Space((-300, -half, -60), (300, half, 90), turn=(15.0, 0.0, 0.0))
+    turn = (float(rng.uniform(-40, 40)), float(rng.uniform(-30, 30)), float(rng.uniform(-60, 60)))
+    space = Space((-300, -half, -60), (300, half, 90), turn=turn)
     t = space.z - relief(rng, space.x, 0 * space.y, 0.3)
     return space.body(((t > 0) & (t < 30), t / 30))
 

@@ -41,11 +41,10 @@ class FieldBlocks:
     steps : (3,) float
         Block sides along the lattice's axes.
     thinnest : float
-        Blocks across the thinnest ply; infinite in a body whose plies are at least five blocks
-        thick.
+        Blocks across the thinnest ply; infinite if all plies are at least five blocks thick.
     others : tuple of (n,) float
-        Other levels that are as right as ``level``, such as that of a split seam whose parting is
-        taken out.
+        Other levels that are as right as ``level``, such as that of a split seam without its
+        parting.
     """
 
     points: Floats
@@ -71,8 +70,8 @@ class FieldBody:
     builder : callable
         Draws the body from a random generator.
     expects : {'right', 'told'}
-        What a user expects: an answer that is near the truth, or at least to be told (a refusal or
-        a warning that gives the reason) where coordinates do not decide.
+        What a user expects: an answer that is near the truth, or, if coordinates do not decide, at
+        least to be told (a refusal or a warning that gives the reason).
     about : str
         One line for tables.
     """

@@ -14,7 +14,7 @@ from geounfold.synthetic.field_bodies.blocks import UTM, FieldBlocks, FieldBody,
 
 @dataclass(frozen=True)
 class _Fault:
-    """Return a dip-slip fault.
+    """A dip-slip fault.
 
     Parameters
     ----------

@@ -36,6 +36,10 @@ class NoSheetError(InputError):
     """The body has no two opposite surfaces (a ball, a cube), so nothing to flatten."""
 
 
+class TrustError(InputError):
+    """The layers of the answer are not to be trusted, and ``strict`` was asked for."""
+
+
 class MeshError(GeounfoldError):
     """A mesh is malformed: an index out of range, a wrong shape, a wrong topology."""
 

@@ -17,6 +17,7 @@ from geounfold.geometry.mesh import Bools, Floats, Space, TriMesh, in_space
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.sheet.options import SheetOptions
 from geounfold.methods.sheet.result import SheetResult
+from geounfold.quality.trust import Signs
 from geounfold.surfaces.hull import Hull
 from geounfold.surfaces.split.result import SurfaceSplit
 
@@ -171,6 +172,9 @@ class BodyFit:
         The body's blocks if ``rule`` is set: points near them count as inside.
     warnings : tuple of str
         One sentence each.
+    signs : Signs or None
+        What the hull shows of the control mesh; None if there is no control mesh, or if it was not
+        measured yet.
     """
 
     hull: Hull | None
@@ -184,6 +188,7 @@ class BodyFit:
     rule: Pointwise | None = None
     points: Floats | None = None
     warnings: tuple[str, ...] = ()
+    signs: Signs | None = None
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,11 @@ def _headline(summary: Mapping[str, Any]) -> tuple[str, str]:
         return "bad", "The map is not proved one-to-one: do not use it as it is."
     if None in inverted:
         return "care", "It is not known whether the map folds over itself."
+    trust = mapping(summary.get("trust")).get("word")
+    if trust == "poor":
+        return "bad", "Proved one-to-one, but the layers look wrong: see what to distrust."
+    if trust == "fair":
+        return "care", "Usable with care: some of the layers may be wrong."
     if outside is not None and outside > _CARE:
         return "care", f"Usable with care: {outside:.2%} of the blocks were extrapolated."
     if summary.get("torn"):
@@ -131,15 +136,24 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _distrust(summary: Mapping[str, Any]) -> Iterator[str]:
+    yield from _layers_to_distrust(mapping(summary.get("trust")))
     yield from _places_to_distrust(summary)
     yield from _shapes_to_distrust(summary)
     yield from _holes_to_distrust(mapping(summary.get("drillholes")))
     if summary:
         yield (
             "A proved map does not overlap and has an inverse; the geology may still be wrong. "
-            "Faults, and limbs less than a block apart, are not detected: check the layers against "
-            "known horizons before you compute variograms."
+            "Coordinates do not show every fault, nor limbs less than a block apart: check the "
+            "layers against known horizons before you compute variograms."
         )
+
+
+def _layers_to_distrust(trust: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the reasons not to trust the layers."""
+    for reason in trust.get("reasons", ()):
+        what, where, do = reason["what"], reason["where"], reason["do"]
+        place = "" if where is None else f", most around ({', '.join(number(c) for c in where)})"
+        yield f"{what[0].upper()}{what[1:]}{place}: {do}."
 
 
 def _places_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:

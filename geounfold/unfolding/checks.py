@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from geounfold.body.prepare import PreparedPoints
-from geounfold.errors import ControlMeshError, OptionError
+from geounfold.errors import ControlMeshError, OptionError, TrustError
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.mapping.carried import Carried, Returned
+from geounfold.mapping.carried import Carried, Returned, few
 from geounfold.mapping.certificate import Certificate
 from geounfold.methods import METHODS, no_mesh
 from geounfold.quality.blocks import Quality
+from geounfold.quality.trust import Trust
 from geounfold.unfolding.options import UnfoldOptions
 
 
@@ -88,15 +89,21 @@ def check_certified(certificate: Certificate, options: UnfoldOptions) -> None:
     )
 
 
-def check_placed(prepared: PreparedPoints, carried: Carried, options: UnfoldOptions) -> None:
-    """Raise ControlMeshError if blocks of a body have no image, unless that is allowed.
+def check_trust(trust: Trust | None, options: UnfoldOptions) -> None:
+    """Raise TrustError if the trust is poor and only trusted answers are wanted."""
+    if options.strict and trust is not None and trust.word == "poor":
+        raise TrustError(f"{trust.sentence()}; leave out --strict to write the answer all the same")
 
-    Blocks that mending left out of the hull may lie beyond the map's reach: they are left empty,
-    which is a warning.
+
+def check_placed(prepared: PreparedPoints, carried: Carried, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError if more than a few blocks of a body have no image.
+
+    Nothing is raised if that is allowed.  A few, and blocks that mending left out of the hull, are
+    left empty and counted in a warning.
     """
     folded, kept = prepared.points, prepared.mended.fate == 0
     rows = np.concatenate([g[~carried.placed[g] & kept[g]] for g in prepared.groups])
-    if not len(rows) or options.allow_uncertified:
+    if len(rows) <= few(len(folded)) or options.allow_uncertified:
         return
     where = ", ".join(f"{c:.6g}" for c in np.median(folded[rows], axis=0))
     raise ControlMeshError(

@@ -10,19 +10,21 @@ import numpy as np
 from geounfold.body.prepare import PreparedPoints
 from geounfold.body.working_frame import Frame
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.mapping.carried import Carried, Returned
+from geounfold.mapping.carried import Carried, Returned, few
 from geounfold.mapping.certificate import Certificate, certify, certify_parts
 from geounfold.mapping.control_mesh import ControlMesh, scaled
 from geounfold.mapping.mesh_map import UnfoldingMap
-from geounfold.methods import PointwiseMap
+from geounfold.methods import BodyFit, PointwiseMap
 from geounfold.methods.contract import Stage
 from geounfold.quality.blocks import Quality, assess, assess_points
 from geounfold.quality.torn_blocks import SUSPECT, torn_blocks
+from geounfold.quality.trust import Signs, Trust, judge, measure_signs
 from geounfold.unfolding.checks import (
     check_certified,
     check_coordinates,
     check_placed,
     check_torn,
+    check_trust,
 )
 from geounfold.unfolding.options import UnfoldOptions
 
@@ -43,6 +45,8 @@ class Measured:
         Figures for the whole and per block.
     torn : (k,) int
         Rows of blocks that came to lie far from a block that they touch.
+    trust : Trust or None
+        How far to trust the layers; None if the method has no control mesh.
     """
 
     carried: Carried
@@ -50,11 +54,13 @@ class Measured:
     certificate: Certificate
     quality: Quality
     torn: Ints
+    trust: Trust | None
 
 
 def measure(
     mapping: UnfoldingMap | PointwiseMap,
     prepared: PreparedPoints,
+    fits: Sequence[BodyFit],
     options: UnfoldOptions,
     stage: Stage,
 ) -> Measured:
@@ -64,7 +70,8 @@ def measure(
     ------
     ControlMeshError
         The answer is not proved one-to-one, leaves blocks of a body without an image, or tears
-        blocks apart, and ``options.allow_uncertified`` is not set.
+        blocks apart, and ``options.allow_uncertified`` is not set; or the trust is poor and
+        ``options.strict`` is set.
     """
     P, frame = prepared.points, prepared.frame
     with stage("map"):
@@ -77,14 +84,41 @@ def measure(
     with stage("quality"):
         quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
         torn = _torn(prepared.groups, prepared.work, carried, quality, frame)
+        if 0 < len(torn) <= few(len(P)):
+            carried, torn = carried.without(torn), torn[:0]
+            returned = mapping.returned(P, carried)
+            quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
     check_coordinates(quality, returned, P, options)
     check_torn(torn, P, options)
-    return Measured(carried, returned, certificate, quality, torn)
+    with stage("trust"):
+        trust = _trust(mapping, fits, carried, P, frame)
+    check_trust(trust, options)
+    return Measured(carried, returned, certificate, quality, torn, trust)
 
 
 def in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
     """Return a control mesh in the data's coordinates and unit."""
     return scaled(control, frame.to_world(control.folded.V), frame.scale)
+
+
+def _trust(
+    mapping: UnfoldingMap | PointwiseMap,
+    fits: Sequence[BodyFit],
+    carried: Carried,
+    points: Floats,
+    frame: Frame,
+) -> Trust | None:
+    """Return how far to trust the layers of all bodies; None without a control mesh."""
+    if isinstance(mapping, PointwiseMap):
+        return None
+    signs = [fit.signs or _signs_of(fit, mapping, frame) for fit in fits]
+    return judge(signs, frame, points, carried.stratigraphic)
+
+
+def _signs_of(fit: BodyFit, mapping: UnfoldingMap, frame: Frame) -> Signs:
+    """Return the signs of a method that lays its own surfaces flat, not the mid surface."""
+    side = 1.0 if frame.sides is None else float(max(frame.sides))
+    return measure_signs(fit.split.mesh, mapping, side, over_mid=False)
 
 
 def _torn(

@@ -26,6 +26,8 @@ class Facts:
         Relative change of the distances to the neighbours: mean and 95th percentile.
     volume : float
         Volume of the body, unfolded over folded.
+    trust : str or None
+        How far to trust the layers: good, fair or poor; None if that was not judged.
     round_trip : float or None
         Largest distance between a point and its image carried back; None if there is no way
         back.
@@ -44,6 +46,7 @@ class Facts:
     epsilon: float
     epsilon_p95: float
     volume: float
+    trust: str | None
     round_trip: float | None
     seconds: float
     warnings: Sequence[str]
@@ -79,6 +82,7 @@ class Facts:
             f"{self.outside:,} outside the control mesh",
             "epsilon": f"{self.epsilon:.4f} mean, {self.epsilon_p95:.4f} 95th percentile",
             "volume": f"{self.volume:.4f} of the folded body's",
+            **({} if self.trust is None else {"trust in the layers": self.trust}),
             "there and back": "no way back"
             if self.round_trip is None
             else f"{self.round_trip:.2g} at most off",

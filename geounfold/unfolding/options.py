@@ -88,6 +88,8 @@ class UnfoldOptions:
         Distance from the body, in blocks, up to which other points are carried.
     allow_uncertified : bool
         Whether an answer that is not proved one-to-one is given, marked, and is no error.
+    strict : bool
+        Whether an answer of poor trust is an error.
     flattener_options : dataclass, dict or None
         Options of the flattener, such as SpringOptions; None for its defaults.
     hull_options : HullOptions or dict
@@ -128,6 +130,7 @@ class UnfoldOptions:
     neighbours: int = NEIGHBOURS
     reach: float = REACH
     allow_uncertified: bool = False
+    strict: bool = False
     flattener_options: Any = None
     hull_options: HullOptions = field(default_factory=HullOptions)
     sheet_options: SheetOptions = field(default_factory=SheetOptions)
@@ -148,6 +151,7 @@ class UnfoldOptions:
         check_whole("neighbours", self.neighbours, 1)
         check_number("reach", self.reach, 0)
         check_flag("allow_uncertified", self.allow_uncertified)
+        check_flag("strict", self.strict)
         for name, kind in (
             STAGES | {"flattener_options": FLATTENERS[self.flattener].options}
         ).items():

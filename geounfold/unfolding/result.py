@@ -55,6 +55,8 @@ class Unfolding:
         Figures for the whole and per block.
     certificate : Certificate
         What is proved of the map, and what stands against it; also a mapping.
+    trust : Trust or None
+        How far to trust the layers: good, fair or poor, with reasons; None without a control mesh.
     seconds : dict of float
         Per stage.
     """
@@ -73,6 +75,7 @@ class Unfolding:
         self.carried = measured.carried
         self.quality = measured.quality
         self.certificate = measured.certificate
+        self.trust = measured.trust
         self.seconds = record.seconds
 
     @property
@@ -305,6 +308,7 @@ class Unfolding:
             epsilon=self.quality.nmd.mean,
             epsilon_p95=self.quality.nmd.p95,
             volume=self.quality.volume_unfolded / self.quality.volume_folded,
+            trust=None if self.trust is None else self.trust.word,
             round_trip=self.round_trip_max,
             seconds=sum(self.seconds.values()),
             warnings=warnings_of(self._record),

@@ -115,7 +115,7 @@ def unfold(
     del bodies  # as large as the points, and not needed any more
     with clock.stage("map"):
         mapping = _one_map(fits, prepared, chosen)
-    measured = measure(mapping, prepared, chosen, clock.stage)
+    measured = measure(mapping, prepared, fits, chosen, clock.stage)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
     return Unfolding(record, points if isinstance(points, pd.DataFrame) else None)
 

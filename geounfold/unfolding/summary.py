@@ -126,6 +126,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "outside": _outside(run),
         "round_trip_max": run.round_trip_max,
         "torn": len(run.measured.torn),
+        "trust": None if run.measured.trust is None else run.measured.trust.as_dict(),
         **run.measured.quality.summary(),
         "warnings": warnings_of(run),
     }
@@ -155,12 +156,15 @@ def warnings_of(run: RunRecord) -> list[str]:
     if empty:
         out.append(
             f"{empty} of {count} points lie farther from the control mesh than the "
-            f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}), "
-            f"{_first_place(run, np.flatnonzero(~run.measured.carried.placed))}; they were left "
-            "empty and are marked outside"
+            f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}) or were torn from "
+            f"their neighbours, {_first_place(run, np.flatnonzero(~run.measured.carried.placed))}; "
+            "they were left empty and are marked outside"
         )
     if len(run.measured.torn):
         out.append(f"{len(run.measured.torn)} blocks were torn from their neighbours")
+    trust = run.measured.trust
+    if trust is not None and trust.word == "poor":
+        out.append(trust.sentence())
     out += [warning for fit in run.fits for warning in fit.warnings]
     if not run.injective:
         out.append(f"the map is not proved one-to-one: {', '.join(run.faults)}")

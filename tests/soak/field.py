@@ -10,7 +10,7 @@ or timeout.  Its verdict is one of
 
   right            answered; err <= 0.05, or 0.1 if a ply is thinner than five blocks; no true part
                    above twice that; 99 % of the blocks that have a level are answered
-  told             answered, not right, and trust is poor or a warning gives the reason
+  told             answered, not right, and trust is poor
   refused rightly  refused; the user expects to be told, and the reason is not a false one
   refused wrongly  refused; the user expects an answer, or the reason is false
   silent           answered, not right, without a word
@@ -52,9 +52,6 @@ MOST_ERROR, MOST_ERROR_THIN = 0.05, 0.1  # of the level; thin: a ply below five 
 LEAST_COVERAGE = 0.99
 MOST_OUTSIDE = 0.01  # of the blocks; sound bodies have at most 0.7 %
 LONG = 60.0  # seconds that no body should take
-SAYS_SO = re.compile(
-    r"\b(trust|stratigraphic|sheets?|parts|faults?|branch|split|step|handles?|crude|thickness|waste)"
-)
 # No body of the suite is a tube.
 FALSE_REASON = re.compile("closes on itself")
 FALSE_OF_ONE_PIECE = re.compile("do not touch")
@@ -156,8 +153,8 @@ def is_right(row: Row, body: Any) -> bool:
 
 
 def is_told(row: Row) -> bool:
-    """Return whether trust or a warning tells the user that an answer may be wrong."""
-    return row.trust == "poor" or SAYS_SO.search(row.warnings) is not None
+    """Return whether the user is told that an answer may be wrong."""
+    return row.trust == "poor"
 
 
 def refusal(row: Row, whole: bool) -> str:

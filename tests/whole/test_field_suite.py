@@ -48,7 +48,7 @@ RISE = np.linspace(0, 1, 100)
         (RISE + 0.2, {}, "silent"),
         (RISE + 0.2, {"trust": {"word": "poor", "reasons": []}}, "told"),
         (RISE + 0.2, {"trust": {"word": "fair", "reasons": []}}, "silent"),
-        (RISE + 0.2, {"warnings": ["2 sheets meet at 1, 2, 3"]}, "told"),
+        (RISE + 0.2, {"warnings": ["2 sheets meet at 1, 2, 3"]}, "silent"),
         (RISE + 0.2, {"warnings": ["3 points repeat the coordinates of another"]}, "silent"),
         (np.where(RISE < 0.1, np.nan, RISE), {}, "silent"),  # a tenth is not answered
     ],

@@ -90,7 +90,7 @@ def add_holes(section: Section) -> None:
         "--strict",
         action="store_true",
         rare=True,
-        help="refuse tables with a row that would be left out, cut or changed",
+        help="refuse what is otherwise a warning: rows left out, cut or changed, and poor trust",
     )
 
 

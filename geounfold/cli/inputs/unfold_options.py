@@ -41,6 +41,8 @@ def unfold_options(args: Namespace) -> UnfoldOptions:
     values = {name: _READERS.get(name, str)(text) for name, text in given.items()}
     if hasattr(args, "allow_uncertified"):
         values["allow_uncertified"] = args.allow_uncertified
+    if getattr(args, "strict", False):
+        values["strict"] = True
     path = config_file(args)
     base = None if path is None else _read_config(path)
 

@@ -27,6 +27,7 @@ def sheet_method(body: PreparedBody) -> BodyFit:
         "merged": unit,
         "split": [candidate.row() for candidate in body.split.candidates],
         "attempts": [trial.row() for trial in result.trials],
+        "finishes": [finish.row() for finish in result.finishes],
         "rung": mesh.rungs[-1].name,
         "rungs": [asdict(rung) for rung in mesh.rungs],
         "roughness": result.fitted.roughness,
@@ -44,4 +45,5 @@ def sheet_method(body: PreparedBody) -> BodyFit:
         mesh.flattenings,
         result,
         notes,
+        signs=result.finish.signs,
     )

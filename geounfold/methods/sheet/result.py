@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from geounfold.methods.sheet.attempts import Trial
+from geounfold.methods.sheet.finishes import Finish
 from geounfold.methods.sheet.meshing.build import SheetMesh
 from geounfold.methods.sheet.meshing.top_and_bottom import Horizons
 from geounfold.methods.sheet.mid_surface.fit import FittedSheet
@@ -19,23 +20,35 @@ class SheetResult:
     ----------
     medial : MedialSheet
         First guess of the mid surface.
-    fitted : FittedSheet
-        The mid surface and the half thickness.
-    horizons : Horizons
-        Top and bottom as heights over the mid surface.
-    mesh : SheetMesh
-        The control mesh and its shell.
     trials : tuple of Trial
-        Every attempt to fit the mid surface; the last one was taken.
+        Every attempt to fit the mid surface; the blocks contradict the last one least.
+    finish : Finish
+        The finished control mesh that was taken.
+    finishes : tuple of Finish
+        All that were tried, in order.
     """
 
     medial: MedialSheet
-    fitted: FittedSheet
-    horizons: Horizons
-    mesh: SheetMesh
     trials: tuple[Trial, ...]
+    finish: Finish
+    finishes: tuple[Finish, ...]
+
+    @property
+    def fitted(self) -> FittedSheet:
+        """The mid surface and the half thickness."""
+        return self.finish.fitted
+
+    @property
+    def horizons(self) -> Horizons:
+        """Top and bottom as heights over the mid surface."""
+        return self.finish.horizons
+
+    @property
+    def mesh(self) -> SheetMesh:
+        """The control mesh and its shell."""
+        return self.finish.mesh
 
     @property
     def sharpened(self) -> str:
         """What sharpened the sheet: lattice ``sites``, ``layers``, or nothing (empty)."""
-        return self.trials[-1].sharpened
+        return self.finish.trial.sharpened

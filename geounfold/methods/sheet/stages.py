@@ -11,7 +11,8 @@ from geounfold.geometry.measures import vertex_sum
 from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.methods.contract import PreparedBody
 from geounfold.methods.sheet.attempts import Case, Trial, try_in_turn
-from geounfold.methods.sheet.meshing.build import MeshPlan, build_control
+from geounfold.methods.sheet.finishes import finish_in_turn
+from geounfold.methods.sheet.meshing.build import MeshPlan, SheetMesh, build_control
 from geounfold.methods.sheet.meshing.top_and_bottom import (
     Horizons,
     fit_horizons,
@@ -57,14 +58,21 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
         unit = 1 if body.coarse is None else body.coarse.merge
         medial = medial_sheet(body.split, _parameters, body.sheet_options.core)
         case = _case(body, medial, unit)
-        taken, trials = _fitted(case)
-        fitted = conform(taken.fitted, medial.scaled(unit), _parameters)
-        horizons = _horizons(fitted, case.samples, taken)
+        trials = _fitted(case)
         plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell)
-        mesh = build_control(fitted, horizons, body.points, body.blocks, plan)
-        if unit > 1 and not mesh.sound:
+
+        def build(trial: Trial, misfit: float) -> tuple[FittedSheet, Horizons, SheetMesh]:
+            fitted = conform(trial.fitted, medial.scaled(unit), _parameters)
+            horizons = _horizons(fitted, case.samples, trial, misfit)
+            return fitted, horizons, build_control(fitted, horizons, body.points, body.blocks, plan)
+
+        hull = body.split.scaled(unit).mesh
+        sides = body.frame.sides
+        side = unit * (1.0 if sides is None else float(max(sides)))
+        best, finishes = finish_in_turn(trials, build, hull, body.frame, side)
+        if unit > 1 and not best.mesh.sound:
             raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
-        return SheetResult(medial, fitted, horizons, mesh, trials)
+        return SheetResult(medial, trials, best, finishes)
 
 
 def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:
@@ -99,8 +107,8 @@ def _sites(body: PreparedBody) -> Sites | None:
     return surface_sites(near, steps, coarse.border[coarse.beside])
 
 
-def _fitted(case: Case) -> tuple[Trial, tuple[Trial, ...]]:
-    """Return the trial that is taken, and all of them.
+def _fitted(case: Case) -> tuple[Trial, ...]:
+    """Return the trials that are finished, the one taken last; of merged blocks that one alone.
 
     Raises
     ------
@@ -114,13 +122,13 @@ def _fitted(case: Case) -> tuple[Trial, tuple[Trial, ...]]:
         raise SplitError(
             f"a sheet fitted to cells of {case.unit} blocks a side cannot be sharpened"
         )
-    return taken, trials
+    return trials if case.unit == 1 else (taken,)
 
 
-def _horizons(fitted: FittedSheet, samples: HullSamples, taken: Trial) -> Horizons:
+def _horizons(fitted: FittedSheet, samples: HullSamples, taken: Trial, misfit: float) -> Horizons:
     """Return top and bottom, fitted to the hull and moved by the lattice sites if they agree."""
     hull = fitted.scaled(1 / fitted.unit)
-    horizons = fit_horizons(hull, samples, hull.sheet.grid.step).scaled(fitted.unit)
+    horizons = fit_horizons(hull, samples, hull.sheet.grid.step, misfit).scaled(fitted.unit)
     if taken.sharpened == "sites" and taken.sites is not None:
         return separate_horizons(fitted, horizons, taken.sites, SiteRules())
     return horizons

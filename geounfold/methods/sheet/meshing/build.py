@@ -102,6 +102,8 @@ class SheetMesh:
         Result of every rung of the ladder that was tried; the last is the one taken.
     surfaces : dict of (TriMesh, TriMesh)
         Mid, top and bottom surface, folded and unfolded, over the footprint.
+    over_mid : (ControlMesh, ControlMesh or None)
+        Control mesh and shell with the mid surface flat, whatever the datum.
     """
 
     control: ControlMesh
@@ -110,11 +112,18 @@ class SheetMesh:
     layers: Layers
     rungs: tuple[Rung, ...]
     surfaces: dict[str, tuple[TriMesh, TriMesh]]
+    over_mid: tuple[ControlMesh, ControlMesh | None]
+
+    @property
+    def lost(self) -> float:
+        """Least number of blocks that a proved rung does not hold; infinite if none was proved."""
+        proved = [r.lost for r in self.rungs if not r.flaws and r.lost is not None]
+        return min(proved, default=float("inf"))
 
     @property
     def sound(self) -> bool:
         """Whether some rung was proved and lost no block."""
-        return any(not rung.flaws and rung.lost == 0 for rung in self.rungs)
+        return self.lost == 0
 
 
 def register(A: Floats, B: Floats, weight: Floats) -> Floats:
@@ -424,11 +433,14 @@ def build_control(
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}
+    control, shell = laid.control(), laid.shell_mesh()
+    level = laid.over_mid()
     return SheetMesh(
-        control=laid.control(),
-        shell=laid.shell_mesh(),
+        control=control,
+        shell=shell,
         flattenings=columns.flattenings,
         layers=laid.layers,
         rungs=climbed.rungs,
         surfaces=surfaces,
+        over_mid=(control, shell) if plan.datum == "mid" else (level.control(), level.shell_mesh()),
     )

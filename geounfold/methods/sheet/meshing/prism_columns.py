@@ -41,6 +41,7 @@ class Laid:
     folded: Floats
     unfolded: Floats
     stratigraphic: Floats
+    height: Floats
     node: Ints
     T: Ints
     shell: Ints
@@ -59,6 +60,7 @@ class Laid:
             folded=self.folded[:n],
             unfolded=self.unfolded[:n],
             stratigraphic=self.stratigraphic[:n],
+            height=self.height[:n],
             node=self.node[:n],
             shell=np.empty((0, 4), np.int64),
         )
@@ -78,6 +80,7 @@ class Laid:
             folded=self.folded[order],
             unfolded=self.unfolded[order],
             stratigraphic=self.stratigraphic[order],
+            height=self.height[order],
             node=self.node[order],
             T=np.concatenate([self.T, number[self.shell[moved]]]),
             shell=number[self.shell[~moved]],
@@ -92,6 +95,11 @@ class Laid:
             TetMesh(self.unfolded[:n], self.T),
             self.stratigraphic[:n],
         )
+
+    def over_mid(self) -> Laid:
+        """Return the same with the mid surface flat, whatever the datum."""
+        flat = np.column_stack([self.unfolded[:, :2], self.height])
+        return replace(self, unfolded=flat)
 
     def shell_mesh(self) -> ControlMesh | None:
         """Return the shell, over all vertices; None if it is empty."""
@@ -218,6 +226,7 @@ class Columns:
             folded,
             unfolded,
             stratigraphic,
+            height,
             node,
             around.layers.tets(),
             around.tets(),

@@ -99,6 +99,7 @@ def _with_tips(laid: Laid, tips: Floats, gluing: Gluing, faces: Ints) -> Laid:
         stratigraphic=np.concatenate(
             [laid.stratigraphic, np.einsum("ij,ij->i", share, laid.stratigraphic[owner])]
         ),
+        height=np.concatenate([laid.height, np.einsum("ij,ij->i", share, laid.height[owner])]),
         node=np.concatenate([laid.node, laid.node[base[:, 0]]]),
         shell=np.concatenate([laid.shell, np.column_stack([base, number])]),
     )

@@ -1,0 +1,245 @@
+"""Signs that a finished unfolding is wrong, measured on the hull that the map carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy import ndimage
+
+from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.quality.trust.carried_hull import CarriedHull, carry_hull
+from geounfold.quality.trust.flat_columns import FlatColumns, flat_columns
+
+_LEVEL = 0.85
+"""Vertical component of the flat normal (32 degrees) from which a face is a horizon's."""
+
+_OBLIQUE = 0.7
+"""The same (45 degrees) with oblique ends among them."""
+
+_OFF = (1.0, 0.25)
+"""Blocks, and share of the thickness, by the larger of which a face misses its level."""
+
+_STRETCHED = 0.3
+"""|log| of a principal stretch above which a length is not kept."""
+
+_INSIDE = 3.0
+"""Blocks inside the outline from which faces count; half a thickness if that is more."""
+
+_ENOUGH = 0.3
+"""Share of the outermost faces that must be left inside, or the distance is given up."""
+
+_COLUMN = 1.5
+"""Side of a column, in the longest side of a block: none is missed for want of a face."""
+
+_BEYOND = 1.0
+"""Blocks by which the mid surface must lie outside the body to count."""
+
+_STEP = (2.0, 0.35)
+"""Blocks, and share of the thickness, by the larger of which a horizon steps over two columns."""
+
+_THICKEST = 3.0
+"""Median thicknesses above which a thickness is cut: feather edges of the map are no measure."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a sign is found.
+
+    Attributes
+    ----------
+    folded : (3,) float
+        Centre of its largest patch, working units.
+    volume : float
+        Volume of the columns in which it is found, in blocks.
+    """
+
+    folded: Floats
+    volume: float
+
+
+@dataclass(frozen=True, eq=False)
+class Signs:
+    """What the hull shows of a finished unfolding.  Shares are of the hull's top and bottom.
+
+    Attributes
+    ----------
+    off : float
+        Share that looks up or down in the flat space and misses level 1 or 0.
+    length : float
+        Share of which a length changes by more than 30 %.
+    ends : float
+        As ``off``, faces of up to 45 degrees among them.
+    level : float
+        Share of the outline in which the mid surface lies outside the body.  NaN if heights are
+        not those over the mid surface.
+    step : float
+        Length of the longest line along which the top or the bottom steps, over the width of the
+        widest disc in the outline.  NaN as ``level``.
+    breadth : float
+        Widest disc in the outline over the median thickness.
+    thickness : float
+        Median thickness, in blocks.
+    lost : float
+        Share of the hull's area that the map does not carry.
+    places : dict of Place
+        Where the signs are found, by their names.
+    """
+
+    off: float
+    length: float
+    ends: float
+    level: float
+    step: float
+    breadth: float
+    thickness: float
+    lost: float
+    places: dict[str, Place]
+
+    def figures(self) -> dict[str, float | None]:
+        """Return the figures by name, for the summary; None if one was not measured."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "places"}
+        return {name: value if np.isfinite(value) else None for name, value in values.items()}
+
+
+def measure_signs(
+    hull: TriMesh, mapping: UnfoldingMap, side: float, *, over_mid: bool = True
+) -> Signs:
+    """Return the signs of one body.
+
+    Parameters
+    ----------
+    hull : TriMesh
+        The closed surface around its blocks, working units.
+    mapping : UnfoldingMap
+        The finished map.
+    side : float
+        Longest side of a block, or of a cell of merged blocks, working units.
+    over_mid : bool
+        Whether the map's heights are those over the mid surface.
+    """
+    side = max(1.0, side)
+    faces = carry_hull(hull, mapping)
+    columns = flat_columns(faces, _COLUMN * side)
+    ends, _ = _off(faces, columns, _OBLIQUE)
+    off, thickness = _off(faces, columns, _LEVEL)
+    stretch, area = faces.stretch(ends.rows)
+    length = _Share(ends.rows, stretch > _STRETCHED, area)
+    left, stepped = _left_by_mid(columns), _stepped(columns, side)
+    width = float(2 * columns.depth.max() - columns.side)
+    at = columns.of(faces.flat_centre)
+    bad = {
+        "off": off.rows[off.bad],
+        "length": length.rows[length.bad],
+        "ends": ends.rows[ends.bad],
+        "level": np.flatnonzero(left[at] & over_mid),
+        "step": np.flatnonzero(stepped[at] & over_mid),
+    }
+    return Signs(
+        off=off.value,
+        length=length.value,
+        ends=ends.value,
+        level=_share(left, columns.within) if over_mid else float("nan"),
+        step=_longest(stepped) * columns.side / max(width, columns.side)
+        if over_mid
+        else float("nan"),
+        breadth=width / thickness,
+        thickness=thickness,
+        lost=faces.lost,
+        places={name: _place(faces, columns, rows) for name, rows in bad.items() if len(rows)},
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Share:
+    """Faces (k,), which of them are bad, and what each weighs."""
+
+    rows: Ints
+    bad: Bools
+    weight: Floats
+
+    @property
+    def value(self) -> float:
+        return float(self.weight[self.bad].sum() / self.weight.sum()) if len(self.rows) else 1.0
+
+
+def _off(faces: CarriedHull, columns: FlatColumns, least: float) -> tuple[_Share, float]:
+    """Return the outermost faces that look up or down and which miss their level; thickness."""
+    area, z = faces.flat_area, faces.flat_centre[:, 2]
+    up, down = faces.up > least, faces.up < -least
+    at = columns.of(faces.flat_centre)
+    flat = up | down
+    thickness = _median(faces.thickness[flat], area[flat])
+    outer = (up & (z > columns.highest[at] - 1)) | (down & (z < columns.lowest[at] + 1))
+    depth = columns.depth[at]
+    use = outer
+    for distance in (max(_INSIDE, thickness / 2), _INSIDE):
+        inside = outer & (depth > distance)
+        if area[inside].sum() > _ENOUGH * area[outer].sum():
+            use = inside
+            break
+    rows = np.flatnonzero(use)
+    own = faces.thickness[rows]
+    miss = np.abs(np.where(up[rows], faces.level[rows] - 1, faces.level[rows]))
+    miss *= np.minimum(own, _THICKEST * thickness)
+    return _Share(rows, miss > np.maximum(_OFF[0], _OFF[1] * own), area[rows]), thickness
+
+
+def _share(bad: Bools, among: Bools) -> float:
+    return float(bad.sum() / max(int(among.sum()), 1))
+
+
+def _left_by_mid(columns: FlatColumns) -> Bools:
+    """Return the columns in which the mid surface, height 0, lies outside the body, (r, c)."""
+    out: Bools = (columns.lowest > _BEYOND) | (columns.highest < -_BEYOND)
+    return out & columns.within
+
+
+def _stepped(columns: FlatColumns, side: float) -> Bools:
+    """Return the columns on the longest line along which the top or the bottom steps, (r, c)."""
+    within = columns.within
+    found = np.zeros(within.shape, bool)
+    high, low = (np.where(within, h, np.nan) for h in (columns.highest, columns.lowest))
+    for horizon in (high, low):
+        steps = np.zeros(within.shape, bool)
+        for axis in (0, 1):
+            before, after = columns.beside(horizon, axis)
+            thick = np.fmax(*columns.beside(high - low, axis))
+            steps |= np.abs(after - before) > np.maximum(_STEP[0] * side, _STEP[1] * thick)
+        line, count = ndimage.label(steps, np.ones((3, 3)))
+        if count:
+            extents = [max(s.stop - s.start for s in box) for box in ndimage.find_objects(line)]
+            longest = line == 1 + int(np.argmax(extents))
+            found = longest if _longest(longest) > _longest(found) else found
+    return found
+
+
+def _longest(line: Bools) -> int:
+    """Return how many columns a line is long."""
+    rows, columns = np.nonzero(line)
+    return max(int(np.ptp(rows)), int(np.ptp(columns))) + 1 if len(rows) else 0
+
+
+def _median(values: Floats, weights: Floats) -> float:
+    """Return the weighted median; NaN of nothing."""
+    if not len(values):
+        return float("nan")
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
+
+
+def _place(faces: CarriedHull, columns: FlatColumns, bad: Ints) -> Place:
+    """Return where bad faces are: the middle of their largest patch, and the volume beneath."""
+    row, column = columns.of(faces.flat_centre[bad])
+    mask = np.zeros(columns.depth.shape, bool)
+    mask[row, column] = True
+    patch, _ = ndimage.label(mask, np.ones((3, 3)))
+    own = patch[row, column]
+    weight = np.bincount(own, faces.flat_area[bad])
+    mine = bad[own == int(weight.argmax())]
+    middle = np.average(faces.folded_centre[mine], axis=0, weights=faces.flat_area[mine])
+    nearest = np.linalg.norm(faces.folded_centre[mine] - middle, axis=1).argmin()
+    high = (columns.highest - columns.lowest)[mask]
+    return Place(faces.folded_centre[mine[nearest]], float(high.sum() * columns.side**2))

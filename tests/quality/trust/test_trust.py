@@ -1,0 +1,189 @@
+"""Trust: bodies with a fault, a repeat, a branch or a bulge, and sound ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import geounfold as gu
+from geounfold.errors import OptionError, TrustError
+from geounfold.geometry.mesh import Floats
+from geounfold.quality.trust import Trust, grade, score
+from geounfold.quality.trust.judge import CRITERIA, NEVER, Criterion
+from geounfold.quality.trust.signs import Signs
+from tests.shapes import slab, turned
+
+THICKNESS = 6.0
+
+
+def _grid(low: tuple[float, float, float], high: tuple[float, float, float]) -> Floats:
+    axes = [np.arange(a, b) + 0.5 for a, b in zip(low, high, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _layer(height: Floats, thickness: Floats | float) -> Floats:
+    return (height > 0) & (height < thickness)
+
+
+def faulted(throw: float) -> Floats:
+    """Return a gently bent layer, cut by a fault of 60 degrees through the origin, not dragged."""
+    P = _grid((-36, -10, -18), (36, 10, 18))
+    x, _, z = P.T
+    moved = np.where(x + z / np.tan(np.radians(60)) > 0, -throw, 0.0)
+    return P[_layer(z - 4 * np.sin(x / 24) - moved, THICKNESS)]
+
+
+def repeated() -> Floats:
+    """Return a layer thrust over itself: both sheets in contact between x = -15 and 15."""
+    P = _grid((-44, -10, 0), (44, 10, 14))
+    x, _, z = P.T
+    lift = THICKNESS * np.clip((30 - x) / 15, 0, 1)
+    over = _layer(z - lift, THICKNESS) & (x > -15)
+    return P[over | (_layer(z, THICKNESS) & (x < 15))]
+
+
+def branched() -> Floats:
+    """Return a layer and a thinner one that leaves it upwards at 45 degrees."""
+    P = _grid((-40, -10, -4), (40, 10, 28))
+    x, _, z = P.T
+    branch = (np.abs(x - z) < 3.5) & (z > 0)
+    return P[(np.abs(z) < 3) | branch]
+
+
+def swelling() -> tuple[Floats, Floats]:
+    """Return a layer whose thickness grows fivefold within ten blocks, and its levels."""
+    P = _grid((-28, -18, -8), (28, 18, 8))
+    x, _, z = P.T
+    half = 1.25 * (1 + 2 * (1 + np.tanh((np.abs(x) - 14) / 4)))
+    inside = np.abs(z) < half
+    return P[inside], ((z + half) / (2 * half))[inside]
+
+
+@pytest.mark.parametrize("name", ["sim_case_1", "wedge"])
+def test_sound_bodies_are_good(name: str) -> None:
+    assert gu.unfold(gu.simulate(name).folded).trust == Trust("good")
+
+
+@pytest.mark.parametrize("datum", ["mid", "top", "bottom", "proportional"])
+def test_fault_is_poor_with_every_datum(datum: str) -> None:
+    trust = gu.unfold(faulted(0.8 * THICKNESS), datum=datum).trust
+    assert trust is not None
+    assert trust.word == "poor"
+    assert "level" in {c.name for c in CRITERIA for r in trust.reasons if r.do == c.do}
+
+
+def test_repeat_is_poor_at_the_end_of_one_of_its_sheets() -> None:
+    trust = gu.unfold(repeated()).trust
+    assert trust is not None
+    assert trust.word == "poor"
+    x = [r.where[0] for r in trust.reasons if r.where is not None]
+    # Both sheets end at 15 from the origin, on either side; a block and a half of slip and hull.
+    assert any(abs(abs(c) - 15) < 5 for c in x), x
+    assert all(r.blocks > 0 for r in trust.reasons if r.where is not None)
+
+
+def test_branch_is_poor_or_refused() -> None:
+    try:
+        u = gu.unfold(branched())
+    except gu.GeounfoldError:
+        return
+    assert u.trust is not None
+    assert u.trust.word == "poor"
+    assert any("trust is poor" in warning for warning in u.summary()["warnings"])
+
+
+def test_bulge_is_right_because_a_second_finish_is_tried() -> None:
+    points, level = swelling()
+    u = gu.unfold(points)
+    rows = u.summary()["method"]["finishes"]
+    assert [row["horizons"] for row in rows] == ["close", "bold"]
+    assert rows[0]["word"] == "poor"
+    assert u.trust is not None
+    assert u.trust.word != "poor"
+    # Mean error over both directions of up; 0.022 to 0.03 on bodies of this kind, 0.4 before.
+    off = min(np.abs(u.stratigraphic - side).mean() for side in (level, 1 - level))
+    assert off < 0.05
+
+
+def test_motion_and_order_of_rows_leave_the_word_and_move_the_place() -> None:
+    points = faulted(0.8 * THICKNESS)
+    order = np.random.default_rng(3).permutation(len(points))
+    first = gu.unfold(points).trust
+    mixed = gu.unfold(points[order]).trust
+    assert first == mixed
+    shift = np.array([448_000.0, 6_900_000.0, 250.0])
+    moved = gu.unfold(points + shift).trust
+    assert moved is not None
+    assert first is not None
+    assert moved.word == first.word
+    for a, b in zip(first.reasons, moved.reasons, strict=True):
+        assert a.what == b.what
+        assert np.allclose(np.array(b.where) - shift, a.where, atol=1e-6)
+    assert gu.unfold(turned(points)).trust.word == first.word
+
+
+def test_strict_raises_and_default_warns() -> None:
+    points = faulted(0.8 * THICKNESS)
+    with pytest.raises(TrustError, match=r"trust is poor: .* around \(.*; leave out --strict"):
+        gu.unfold(points, strict=True)
+    assert TrustError.exit_status == 2
+    with pytest.raises(OptionError, match="strict"):
+        gu.unfold(points, strict="yes")
+
+
+def test_methods_without_a_control_mesh_are_not_judged() -> None:
+    u = gu.unfold(slab(), method="stratigraphic", allow_uncertified=True)
+    assert u.trust is None
+    assert u.summary()["trust"] is None
+
+
+def test_thesis_is_judged_by_its_own_map() -> None:
+    fold = gu.simulate("recumbent").folded  # overturned: vertical pairs are wrong
+    trust = gu.unfold(fold, method="thesis", allow_uncertified=True).trust
+    assert trust is not None
+    assert trust.word == "poor"
+
+
+def _signs(**changes: float) -> Signs:
+    sound = Signs(
+        off=0.0,
+        length=0.0,
+        ends=0.0,
+        level=0.0,
+        step=0.0,
+        breadth=8.0,
+        thickness=5.0,
+        lost=0.0,
+        places={},
+    )
+    return replace(sound, **changes)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA, ids=lambda c: c.name)
+def test_every_criterion_is_fair_and_poor_past_its_limits(criterion: Criterion) -> None:
+    step = -1e-6 if criterion.below else 1e-6
+    assert grade(_signs(**{criterion.name: criterion.fair})) == "good"
+    if criterion.fair != criterion.poor:
+        assert grade(_signs(**{criterion.name: criterion.fair + step})) == "fair"
+    if criterion.poor != NEVER:
+        worse = _signs(**{criterion.name: criterion.poor + step})
+        assert grade(worse) == "poor"
+        assert score(worse) > score(_signs())
+
+
+def test_a_sign_that_was_not_measured_speaks_against_nothing() -> None:
+    unknown = _signs(level=float("nan"), step=float("nan"))
+    assert grade(unknown) == "good"
+    assert unknown.figures()["level"] is None
+
+
+def test_few_blocks_out_of_reach_are_left_empty_and_told() -> None:
+    points = gu.simulate("sim_case_1").folded
+    body = gu.unfold(points)
+    empty = body.carried.without(np.array([3, 7]))
+    assert np.isnan(empty.points[[3, 7]]).all()
+    assert np.isnan(empty.stratigraphic[[3, 7]]).all()
+    assert np.flatnonzero(~empty.placed).tolist() == [3, 7]
+    assert body.carried.placed.all()  # the original stays as it was

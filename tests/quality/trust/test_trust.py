@@ -13,7 +13,7 @@ from geounfold.geometry.mesh import Floats
 from geounfold.quality.trust import Trust, grade, score
 from geounfold.quality.trust.judge import CRITERIA, NEVER, Criterion
 from geounfold.quality.trust.signs import Signs
-from tests.shapes import slab, turned
+from tests.shapes import box, turned
 
 THICKNESS = 6.0
 
@@ -137,13 +137,13 @@ def test_strict_raises_and_default_warns() -> None:
 
 
 def test_methods_without_a_control_mesh_are_not_judged() -> None:
-    u = gu.unfold(slab(24, 20, 5), method="stratigraphic", allow_uncertified=True)
+    u = gu.unfold(box(24, 20, 5), method="stratigraphic", allow_uncertified=True)
     assert u.trust is None
     assert u.summary()["trust"] is None
 
 
 def test_thesis_is_judged_by_its_own_map() -> None:
-    u = gu.unfold(slab(24, 20, 5), method="thesis")  # flat: vertical pairs are right
+    u = gu.unfold(box(24, 20, 5), method="thesis")  # flat: vertical pairs are right
     assert u.trust == Trust("good")
 
 

@@ -65,7 +65,12 @@ def fit(
             return _fit_at(merge, body, frame, options, reference, stage)
         except _TOO_COARSE:
             continue
-    return _fit_at(1, body, frame, options, reference, stage)
+    try:
+        return _fit_at(1, body, frame, options, reference, stage)
+    except _TOO_COARSE as error:
+        if body.mended is None or not body.mended.crude or reference is not None:
+            raise
+        raise NoSheetError(f"{body.mended.too_crude()} (the mended body fails: {error})") from error
 
 
 _TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoSheetError, SplitError)

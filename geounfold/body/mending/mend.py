@@ -1,8 +1,8 @@
 """Mend a body on its lattice, so that its hull is the surface of a ball.
 
 Waste inside the body is filled, thin bridges are cut and small holes are filled, the smallest
-first, until Euler's number counts no handle. A crude body, as an indicator model is, is smoothed as
-a whole if many handles are left. Every change is judged by itself: a body without cavities, pits
+first, until Euler's number counts no handle. A crude body, with many handles as an indicator model
+has them, is then smoothed as a whole. Every change is judged by itself: a body without cavities, pits
 or handles stays as it is.
 """
 
@@ -23,14 +23,14 @@ from geounfold.body.sub_blocks import FEWEST
 from geounfold.geometry.mesh import Bools, Ints
 
 CRUDE = 20
-"""Number of handles above which a body is crude.
+"""Number of handles above which a body is crude and is smoothed as a whole.
 
 Measured: 0 or 1 in 40 sound bodies, 8 in a layer with waste lenses, 9 in a split seam, 160 to 720
 in shells of interpolated indicators.
 """
 
 FEW = 5
-"""Number of handles left above which a crude body is smoothed as a whole, and then refused."""
+"""Number of handles left above which a crude body is refused."""
 
 STRAYS = 0.01
 """Share of stray cells above which a body with handles is smoothed as a whole.
@@ -106,8 +106,7 @@ def _without_handles(whole: Bools, handles: int) -> tuple[Bools, Bools, int]:
     """Return the body with its handles closed, the cells cut as bridges, and the handles left."""
     found = close_handles(whole, handles)
     cut = whole & ~found.body
-    crude = handles > CRUDE and found.left > FEW
-    if crude or (handles and stray_share(found.body) > STRAYS):
+    if handles > CRUDE or (handles and stray_share(found.body) > STRAYS):
         even = smoothed(found.body)
         if even.any():
             even = fill_cavities(even)

@@ -11,6 +11,7 @@ from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending import voxels as voxels_module
 from geounfold.body.mending.euler import euler_number
 from geounfold.body.mending.mend import Mended
+from geounfold.body.mending.record import MendedPlace
 from geounfold.body.prepare import prepare
 from geounfold.errors import NoSheetError
 from geounfold.synthetic import CASES
@@ -172,6 +173,7 @@ def record(**counts):
 def test_body_with_many_handles_left_is_refused():
     record(handles_closed=30, handles_left=5).check()
     record(handles_closed=2, handles_left=9).check()  # a split seam is not crude
+    record(cut=2, smoothed=3).check()
     points = crude(2.0) * 5.0
     prepared, bodies = prepare(points, body=0)
     with pytest.raises(NoSheetError, match=r"crude shell: \d+ handles left .* smoother boundary"):
@@ -216,3 +218,10 @@ def test_records_of_bodies_are_joined():
 def test_mended_of_nothing():
     nothing = Mended(np.zeros((0, 3), np.int64), np.zeros(5, np.int64), 0, 0)
     assert not nothing.changed
+
+
+def test_body_of_which_much_is_left_out_is_refused():
+    place = MendedPlace("smoothed", 4, (10.0, 20.0, 30.0))
+    found = record(filled=3, cut=2, smoothed=4, places=(place,))
+    with pytest.raises(NoSheetError, match=r"6 of 100 blocks left out, most around \(10, 20, 30\)"):
+        found.check()

@@ -8,7 +8,7 @@ import pytest
 
 import geounfold as gu
 from geounfold.cli import main
-from geounfold.errors import NoSheetError
+from geounfold.errors import HullError, NoSheetError
 from geounfold.geometry.measures import unique_edges
 from tests.places import shared
 
@@ -86,3 +86,15 @@ def test_crude_indicator_is_refused_in_one_sentence():
     with pytest.raises(NoSheetError, match=r"^crude shell: \d+ handles left .* loose bits$") as e:
         gu.unfold(table)
     assert e.value.exit_status == 2
+
+
+def test_errors_of_a_crude_body_name_what_was_mended(monkeypatch):
+    def fails(*_):
+        raise HullError("no hull is suitable")
+
+    monkeypatch.setattr("geounfold.unfolding.fit_body._fit_at", fails)
+    with pytest.raises(HullError, match=r"^no hull is suitable"):
+        gu.unfold(layer())
+    monkeypatch.setattr("geounfold.body.mending.record.CRUDE", 0)
+    with pytest.raises(NoSheetError, match=r"crude shell: 0 handles .*fails: no hull is suitable"):
+        gu.unfold(layer())

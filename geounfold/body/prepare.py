@@ -165,7 +165,16 @@ def _places(mended: Mended, cells: Ints, frame: Frame, steps: Floats) -> tuple[M
 def _divided(
     prepared: PreparedPoints, bodies: list[BodyPoints]
 ) -> tuple[PreparedPoints, list[BodyPoints]]:
-    """Return the points with sheet parts in place of the bodies that have several."""
+    """Return the points with sheet parts in place of the bodies that have several.
+
+    Raises
+    ------
+    NoSheetError
+        A body is too crude for a hull, so that its parts mean nothing.
+    """
+    for body in bodies:
+        if body.mended is not None:
+            body.mended.check()
     division = divide([body.fitted for body in bodies], prepared.frame)
     if division is None:
         return prepared, bodies

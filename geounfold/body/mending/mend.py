@@ -2,8 +2,8 @@
 
 Waste inside the body is filled, thin bridges are cut and small holes are filled, the smallest
 first, until Euler's number counts no handle. A crude body, with many handles as an indicator model
-has them, is then smoothed as a whole. Every change is judged by itself: a body without cavities, pits
-or handles stays as it is.
+has them, is then smoothed as a whole. Every change is judged by itself: a body without cavities,
+pits or handles stays as it is.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ MOST_PLACES = 10
 MOST_LEFT_OUT = 0.05
 """Share of the blocks that mending may leave out of the hull.
 
-Measured: 0.042 in a crude shell that is unfolded with 0.2 % of the blocks outside the layer; 0.09 and
-0.14 in others, whose maps put 8 and 29 % of the blocks outside, after a minute.
+Measured: 0.042 in a crude shell that is unfolded with 0.2 % of the blocks outside the layer; 0.09
+and 0.14 in others, whose maps put 8 and 29 % of the blocks outside, after a minute.
 """
 
 _REACH = 1.8  # cells: distance within which changes are one place; a corner apart is 1.73

@@ -54,7 +54,7 @@ class FakeUnfolding(FakeMap):
         self.points, self.location = carried.points, carried.location
         self.stratigraphic = carried.stratigraphic
         self.columns = {"volume_ratio": np.ones(len(points))}
-        self.warnings = warnings
+        self.warnings, self.junctions = warnings, ()
 
     def summary(self) -> dict[str, Any]:
         return {"points": len(self.points), "nmd": np.nan, "warnings": list(self.warnings)}

@@ -49,7 +49,7 @@ class Meeting:
     lateral : float
         Distance from the points of the first plane to the meeting, along the plane.
     cell : float
-        Size of a cell across the regions.
+        Longest side of a cell.
     """
 
     regions: tuple[int, int]
@@ -121,7 +121,6 @@ def _meeting(
     way = (middle[points[1]] - places[0], middle[points[0]] - places[1])
     heights = [(w * n).sum(axis=1) for w, n in zip(way, normals, strict=True)]
     lateral = np.sqrt(np.maximum((way[0] ** 2).sum(axis=1) - heights[0] ** 2, 0.0))
-    cells = [float(np.median(found.rays.cell[p])) for p in points]
     return Meeting(
         pair,
         points,
@@ -130,5 +129,5 @@ def _meeting(
         (thickness[0], thickness[1]),
         float(np.median(np.abs((normals[0] * normals[1]).sum(axis=1)))),
         float(np.median(lateral)),
-        max(cells),
+        found.cell,
     )

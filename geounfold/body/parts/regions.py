@@ -64,6 +64,8 @@ class Regions:
         Whether each point may join a sheet.
     total : float
         Area of all medial points, also those in no region.
+    cell : float
+        Longest side of a cell: how far a mid surface may be off between cells.
     """
 
     rays: MedialPoints
@@ -72,6 +74,7 @@ class Regions:
     thickness: Floats
     firm: Bools
     total: float
+    cell: float
 
     @property
     def count(self) -> int:
@@ -102,7 +105,7 @@ def find_regions(rays: MedialPoints, steps: Floats) -> Regions:
     label = number[found]
     if len(ids) > 1:
         rays = _turned(rays, label, first, second)
-    return Regions(rays, label, area[ids], mean[ids], firm, total)
+    return Regions(rays, label, area[ids], mean[ids], firm, total, float(steps.max()))
 
 
 def _joined(rays: MedialPoints, middle: Floats, steps: Floats) -> tuple[Ints, Ints, Bools]:

@@ -17,7 +17,7 @@ _AREA, _SHARE, _VOLUME = 3.0, 0.02, 0.02
 """Least size of a sheet: thicknesses squared, share of all medial area, share of the volume."""
 
 _ACUTE = 0.9
-"""Cosine between two sheets one above the other, below which they meet as a branch: 26 degrees."""
+"""Cosine between two sheets below which they meet as a branch, no step or neck: 26 degrees."""
 
 _CLOSE = 0.25
 """Height in thicknesses up to which a larger region continues both sides of what is no step.
@@ -143,10 +143,12 @@ def _joined(
         if group[a] != group[b] and rules.hinge.holds(meeting, regions, group):
             joins.append(meeting)
     group = _grouped(regions, joins, steps, stacks, rules.stack)
-    acute = [m for m in stacks if m.cosine < _ACUTE]
-    necks = [m for m in stacks if m.cosine >= _ACUTE]
-    kinds = [(steps, "step"), (necks, "neck"), ([*rest, *acute], "branch")]
-    return group, [Contact(m.regions, kind, m) for found, kind in kinds for m in found]
+    kinds = [(steps, "step"), (stacks, "neck"), (rest, "branch")]
+    return group, [
+        Contact(m.regions, kind if m.cosine > _ACUTE else "branch", m)
+        for found, kind in kinds
+        for m in found
+    ]
 
 
 def _bridged(regions: Regions, step: Meeting, joins: Sequence[Meeting]) -> bool:

@@ -129,12 +129,14 @@ class Unfolding:
 
         Index, columns, their order and types are as given; a column called as a result is
         replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
-        stratigraphic, location, mesh_distance and those of ``columns``.
+        stratigraphic, location, mesh_distance, those of ``columns`` and, if a body has several
+        sheets, body_part.
         """
         given = self._given
         if given is None:
             given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
-        return given.assign(**result_columns(UNFOLDED, self.carried), **self.columns)
+        parts = {"body_part": self.body_part} if self.junctions else {}
+        return given.assign(**result_columns(UNFOLDED, self.carried), **self.columns, **parts)
 
     def to_flat(self, points: Floats) -> Floats:
         """Return other folded points (m, 3) in the flat space."""

@@ -52,6 +52,7 @@ class FakeUnfolding(FakeMap):
 
     def __init__(self, points: np.ndarray) -> None:
         self.map, self.carried, self.columns = self, self.carry(points), {}
+        self.junctions = ()
 
     def summary(self) -> dict[str, Any]:
         return {"points": 3, "nmd": np.nan, "warnings": ["8 blocks lie outside"]}

@@ -17,7 +17,7 @@ or timeout.  Its verdict is one of
   failed, timeout  as the outcome
 
 ``err`` is the mean of |stratigraphic - level| over the blocks that have a level.  Every part of the
-answer (column body_part) may be turned over; the answer is one part if it has no such column.  A
+answer (``u.body_part``) may be turned over; the answer is one part if it has no such column.  A
 body without any level is right if its map is proved and at most 1 % of ``stratigraphic`` lies
 outside [-0.25, 1.25].  Exit status 1 when a body failed or ran out of time.
 """
@@ -105,7 +105,7 @@ def judge(row: Row, body: Any, u: Any) -> None:
     row.warnings = " | ".join(summary["warnings"])
     found = np.isfinite(level)
     row.outside = float((np.abs(level[found] - 0.5) > 0.75).sum() / len(level))
-    own = parts_of(u, len(level))
+    own = u.body_part
     row.parts = len(np.unique(own[found]))
     meant = np.isfinite(body.level)
     if meant.any():
@@ -113,15 +113,6 @@ def judge(row: Row, body: Any, u: Any) -> None:
         errors = [errors_of(level, truth, own, body.part) for truth in (body.level, *body.others)]
         row.err, row.err_part = min(errors)
     row.verdict = "right" if is_right(row, body) else "told" if is_told(row) else "silent"
-
-
-def parts_of(u: Any, count: int) -> np.ndarray:
-    """Return the answer's part of each block: numbers, all 0 if the answer has no parts."""
-    columns = u.columns
-    for name in ("body_part", "body"):
-        if name in columns:
-            return np.unique(np.asarray(columns[name]).astype(str), return_inverse=True)[1]
-    return np.zeros(count, int)
 
 
 def errors_of(

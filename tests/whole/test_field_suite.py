@@ -27,9 +27,9 @@ def field(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 def answer(level: np.ndarray, **more: Any) -> SimpleNamespace:
-    columns = {"body_part": more.pop("part")} if "part" in more else {}
+    part = more.pop("part", np.zeros(len(level), int))
     facts = {"injective": True, "warnings": [], **more}
-    return SimpleNamespace(stratigraphic=level, columns=columns, summary=lambda: facts)
+    return SimpleNamespace(stratigraphic=level, body_part=part, summary=lambda: facts)
 
 
 def truth(level: np.ndarray, part: np.ndarray | None = None, thin: float = np.inf) -> Any:

@@ -117,7 +117,7 @@ def finish_in_turn(
                 break
             signs = measure_signs(hull, UnfoldingMap(frame, *mesh.over_mid), side)
             found.append(Finish(trial, name, fitted, horizons, mesh, signs))
-            if found[-1].good:
+            if found[-1].good or not np.isfinite(mesh.lost):
                 break
         if found:
             return min(found, key=lambda finish: finish.order), tuple(found)

@@ -46,8 +46,11 @@ PAD_CAPPED = 1.0
 SHELL = 3.0
 """Distance, in blocks, to which the shell reaches past the control mesh."""
 
-SHRINKS = 40
-"""Largest number of steps of the repair."""
+SHRINKS = 6
+"""Largest number of steps of the repair.
+
+Of 140 random and field bodies two needed it, one and two steps; 40 made refusals take 70 s.
+"""
 
 _WIDEST = 3.0  # blocks: largest side of the cells on footprints of more than _MANY cells
 _MANY = 8000

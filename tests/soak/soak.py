@@ -60,6 +60,7 @@ class Row:
     peak_mib: float = NAN
     epsilon: float = NAN  # mean epsilon(W, Y)
     rms: float = NAN  # from the truth, after the best proper rotation
+    trust: str = ""  # good, fair or poor
     strain: float = NAN  # median over the blocks of the largest principal strain
     horizon: float = NAN  # mean error of the height within the layer
     outside: float = NAN  # share of the blocks
@@ -114,6 +115,7 @@ def measure(row: Row, body: Any, u: Any) -> None:
     height = np.abs(off) * (body.top - body.bottom)[placed]
     row.epsilon = float(gu.epsilon(body.truth[placed], u.points[placed]).mean())
     row.rms = float(gu.aligned_rms(u.points[placed], body.truth[placed])) / side
+    row.trust = "" if u.trust is None else u.trust.word
     row.strain = float(np.median(stretch))
     row.horizon = float(height.mean()) / side
     row.outside = float(u.outside_share)

@@ -247,6 +247,7 @@ FACTS = Facts(
     epsilon=0.0152,
     epsilon_p95=0.04,
     volume=1.001,
+    trust="good",
     round_trip=2e-11,
     seconds=2.25,
     warnings=(),

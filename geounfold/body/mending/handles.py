@@ -30,6 +30,12 @@ LARGEST_SHARE = 0.1
 BRIDGE = 60
 """Number of cells, per handle and half width, up to which a bridge is cut."""
 
+BRIDGE_SHARE = 0.02
+"""Share of the body up to which a bridge is cut.
+
+A thin wedge or neck with many handles is part of the layer: one of 28 % is in a sound body.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class ClosedHandles:
@@ -89,6 +95,7 @@ def _cut_bridges(body: Bools, width: int) -> Bools:
     if not pieces.count:
         return body
     wanted = (pieces.handles > 0) & (pieces.sizes <= BRIDGE * width * pieces.handles)
+    wanted &= pieces.sizes <= BRIDGE_SHARE * body.sum()
     if not wanted.any():
         return body
     return pieces.with_chosen(wanted & ~_separators(pieces, pieces.with_chosen(wanted)))

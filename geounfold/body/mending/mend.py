@@ -39,6 +39,13 @@ The hull is refused if it leaves a larger share of the blocks outside. Measured:
 sound bodies, 0.021 in a crude one.
 """
 
+MOST_SMOOTHED = 0.05
+"""Share of a body that smoothing may take if the body has few handles.
+
+Such a body is thin or rough rather than crude: of two sound ones with a neck or a tight hinge,
+smoothing would take 5 and 28 %.
+"""
+
 WORDS = ("", "cut", "dropped", "smoothed")
 """What became of a block, by its code: kept, part of a bridge, away from the body, at its skin."""
 
@@ -106,9 +113,11 @@ def _without_handles(whole: Bools, handles: int) -> tuple[Bools, Bools, int]:
     """Return the body with its handles closed, the cells cut as bridges, and the handles left."""
     found = close_handles(whole, handles)
     cut = whole & ~found.body
-    if handles > CRUDE or (handles and stray_share(found.body) > STRAYS):
+    crude = handles > CRUDE
+    if crude or (handles and stray_share(found.body) > STRAYS):
         even = smoothed(found.body)
-        if even.any():
+        lost = 1 - (even & whole).sum() / whole.sum()
+        if even.any() and (crude or lost <= MOST_SMOOTHED):
             even = fill_cavities(even)
             found = close_handles(even, handle_count(even))
             cut |= even & ~found.body

@@ -14,7 +14,7 @@ _MARGIN = 2
 """Empty columns around the body, so that its outline lies inside the array."""
 
 _RIM = 2.0
-"""Columns from the outline within which heights are the rim's, not the layer's."""
+"""Columns from the outline within which heights are always the rim's, not the layer's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +45,9 @@ class FlatColumns:
         cell = np.clip(cell, 0, np.array(self.depth.shape) - 1)
         return cell[:, 0], cell[:, 1]
 
-    @property
-    def within(self) -> Bools:
-        """Columns that the body fills and that its outline does not touch, (r, c)."""
-        out: Bools = np.isfinite(self.highest) & (self.depth > _RIM * self.side)
+    def within(self, distance: float) -> Bools:
+        """Return the columns that the body fills so far inside its outline, (r, c)."""
+        out: Bools = np.isfinite(self.highest) & (self.depth > max(distance, _RIM * self.side))
         return out
 
     def beside(self, field: Floats, axis: int) -> tuple[Floats, Floats]:

@@ -126,7 +126,8 @@ def measure_signs(
     off, thickness = _off(faces, columns, _LEVEL)
     stretch, area = faces.stretch(ends.rows)
     length = _Share(ends.rows, stretch > _STRETCHED, area)
-    left, stepped = _left_by_mid(columns), _stepped(columns, side)
+    within = columns.within(thickness / 2)
+    left, stepped = _left_by_mid(columns) & within, _stepped(columns, within, side)
     width = float(2 * columns.depth.max() - columns.side)
     at = columns.of(faces.flat_centre)
     bad = {
@@ -140,7 +141,7 @@ def measure_signs(
         off=off.value,
         length=length.value,
         ends=ends.value,
-        level=_share(left, columns.within) if over_mid else float("nan"),
+        level=_share(left, within) if over_mid else float("nan"),
         step=_longest(stepped) * columns.side / max(width, columns.side)
         if over_mid
         else float("nan"),
@@ -193,12 +194,11 @@ def _share(bad: Bools, among: Bools) -> float:
 def _left_by_mid(columns: FlatColumns) -> Bools:
     """Return the columns in which the mid surface, height 0, lies outside the body, (r, c)."""
     out: Bools = (columns.lowest > _BEYOND) | (columns.highest < -_BEYOND)
-    return out & columns.within
+    return out
 
 
-def _stepped(columns: FlatColumns, side: float) -> Bools:
+def _stepped(columns: FlatColumns, within: Bools, side: float) -> Bools:
     """Return the columns on the longest line along which the top or the bottom steps, (r, c)."""
-    within = columns.within
     found = np.zeros(within.shape, bool)
     high, low = (np.where(within, h, np.nan) for h in (columns.highest, columns.lowest))
     for horizon in (high, low):

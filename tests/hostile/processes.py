@@ -19,9 +19,10 @@ UNFOLD = ("unfold", "p.csv", "-o", "out.csv", "--summary", "s.json", "--map", "m
 def heed_stops() -> None:
     """Undo what the tests' own caller may have set, and a run would heed.
 
-    ``nohup`` ignores hang-ups, and a shell interruptions of what it runs in the background.
+    ``nohup`` ignores hang-ups, a shell interruptions of what it runs in the background, and a
+    library that ran in the tests' own process may have left terminations ignored.
     """
-    for stop in (signal.SIGHUP, signal.SIGINT):
+    for stop in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
         signal.signal(stop, signal.SIG_DFL)
 
 

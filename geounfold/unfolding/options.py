@@ -80,8 +80,7 @@ class UnfoldOptions:
     parts : str
         ``auto`` fits each sheet of a branched, split or repeated body; ``one`` fits one to all.
     coordinates : str
-        What carries points between the control mesh's vertices: its tetrahedra (``tet``), proved
-        one-to-one, or its prisms (``wachspress``, ``mvc``), smooth inside but not proved.
+        ``tet``: tetrahedra carry points, proved; ``wachspress``, ``mvc``: prisms, not proved.
     neighbours : int
         Neighbours per block in the figures NMD and epsilon.
     reach : float
@@ -89,7 +88,7 @@ class UnfoldOptions:
     allow_uncertified : bool
         Whether an answer that is not proved one-to-one is given, marked, and is no error.
     strict : bool
-        Whether an answer of poor trust is an error.
+        Whether poor trust is an error.
     flattener_options : dataclass, dict or None
         Options of the flattener, such as SpringOptions; None for its defaults.
     hull_options : HullOptions or dict

@@ -26,7 +26,10 @@ def folder(tmp_path, monkeypatch):
 def test_tables_of_meshes_and_of_blocks(folder, capsys):
     assert main(["crosscheck", "p.csv", *QUICK, "-o", "t.csv", "--differences", "d.csv"]) == 0
     out, err = capsys.readouterr()
-    assert (out, err) == ("", "")
+    assert out == ""
+    # A thousand blocks of the thesis's body are 1.8 times as wide as thick.
+    assert err.startswith("geounfold: warning: trust is poor: the body is only 1.8 times as wide")
+    assert err.count("\n") == 1
     # Nothing else: fTetWild leaves a file where it runs.
     assert {path.name for path in folder.iterdir()} == {"p.csv", "t.csv", "d.csv"}
     table = pd.read_csv("t.csv")

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import geounfold as gu
 from geounfold.errors import ControlMeshError, InputError, OptionError
 from geounfold.geometry.measures import tet_volumes
+from geounfold.mapping.carried import few
 from geounfold.methods import METHODS
 from geounfold.methods.sheet.meshing import build
 from geounfold.synthetic import simulate
@@ -237,12 +238,23 @@ def test_option_values_are_checked(option, value):
 
 def test_torn_blocks_are_an_error_unless_allowed(swelling, monkeypatch):
     # The bodies that were torn once unfold now; what is torn, test_quality.py tests.
-    monkeypatch.setattr(measured, "torn_blocks", lambda *_: np.array([3, 8]))
-    with pytest.raises(ControlMeshError, match=r"2 of .* torn from their neighbours, around"):
+    many = few(len(swelling)) + 1
+    monkeypatch.setattr(measured, "torn_blocks", lambda *_: np.arange(many))
+    with pytest.raises(ControlMeshError, match=rf"{many} of .* torn from their neighbours, around"):
         gu.unfold(swelling)
     u = gu.unfold(swelling, allow_uncertified=True)
-    assert u.summary()["torn"] == 2
+    assert u.summary()["torn"] == many
     assert any("torn" in w for w in u.summary()["warnings"])
+
+
+def test_a_few_torn_blocks_are_left_empty_and_told(swelling, monkeypatch):
+    monkeypatch.setattr(measured, "torn_blocks", lambda *_: np.array([3, 8]))
+    u = gu.unfold(swelling)
+    assert np.flatnonzero(u.location == "outside").tolist() == [3, 8]
+    assert np.isnan(u.points[[3, 8]]).all()
+    assert np.isnan(u.columns["nmd_error"][[3, 8]]).all()
+    assert u.certificate["injective"]
+    assert any("2 of" in w and "left empty" in w for w in u.summary()["warnings"])
 
 
 def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling, monkeypatch):

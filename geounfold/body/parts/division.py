@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.parts import Junction, sheet_parts
+from geounfold.body.sub_blocks import FEWEST
 from geounfold.body.working_frame import Frame
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
@@ -98,8 +99,8 @@ def divide(bodies: Sequence[Floats], frame: Frame) -> Division | None:
         if cells is None:
             return None
         occupied, row = OccupiedCells.numbered(cells)
-        if occupied.gappy():
-            return None
+        if occupied.gappy() or occupied.usual_neighbours < FEWEST:
+            return None  # sheets one block thick have no rays across them
         found = sheet_parts(occupied.cells_of(occupied.keys), frame.steps)
         own = _joined(occupied, found.labels, frame.steps) + len(body)
         shell = _at_surface(occupied, own)

@@ -21,8 +21,7 @@ class SheetOptions:
         Length, in blocks, below which the mid surface is smoothed; shorter follows tighter hinges
         and rougher hulls alike.
     core : float
-        Least cosine between a face's normal and the reversed normal of the face opposite it, for
-        both to be trusted as top and bottom; nearer to 1 is stricter.
+        Least cosine between opposite faces' normals, one reversed, to be top and bottom.
     mesh_cell : float
         Side of the control mesh's cells along the sheet, in blocks.
     merge_above : int

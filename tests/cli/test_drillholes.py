@@ -82,7 +82,6 @@ def test_samples_and_traces_go_with_the_body(
     ("options", "words"),
     [
         (["--composite", "2"], "--composite needs --holes"),
-        (["--strict"], "--strict needs --holes"),
         (["--traces-out", "t.csv"], "--traces-out needs --holes"),
         (["--holes", "c.csv", "s.csv", "a.csv"], "needs --samples-out or --traces-out"),
         (

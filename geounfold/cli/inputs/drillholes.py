@@ -89,7 +89,7 @@ def check_hole_options(args: Namespace) -> None:
         An option of drill-holes without --holes; --holes without an output, or with --samples.
     """
     if args.holes is None:
-        for name in (*_NEEDS_HOLES, "strict"):
+        for name in _NEEDS_HOLES:
             if getattr(args, name) not in (None, False):
                 raise OptionError(f"--{name.replace('_', '-')} needs --holes COLLAR SURVEY ASSAY")
         return

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import geounfold as gu
+from geounfold.cli import main
 from geounfold.errors import OptionError, TrustError
 from geounfold.geometry.mesh import Floats
 from geounfold.quality.trust import Trust, grade, score
@@ -134,6 +137,20 @@ def test_strict_raises_and_default_warns() -> None:
     assert TrustError.exit_status == 2
     with pytest.raises(OptionError, match="strict"):
         gu.unfold(points, strict="yes")
+
+
+def test_strict_on_the_command_line_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points, out = tmp_path / "p.csv", tmp_path / "o.csv"
+    columns = pd.DataFrame(faulted(0.8 * THICKNESS), columns=["x", "y", "z"])
+    columns.to_csv(points, index=False)
+    words = ["unfold", str(points), "-o", str(out), "--parts", "one", "--quiet"]
+    assert main([*words, "--strict"]) == 2
+    assert capsys.readouterr().err.startswith("geounfold: error: trust is poor: ")
+    assert not out.exists()
+    assert main(words) == 0
+    assert out.exists()
 
 
 def test_methods_without_a_control_mesh_are_not_judged() -> None:

@@ -68,7 +68,7 @@ class Finish:
         return {
             "fit": self.trial.name,
             "horizons": self.name,
-            "lost": self.mesh.lost if np.isfinite(self.mesh.lost) else None,
+            "blocks_lost": self.mesh.lost if np.isfinite(self.mesh.lost) else None,
             "word": grade(self.signs),
             **self.signs.figures(),
         }

@@ -102,6 +102,7 @@ def test_bulge_is_right_because_a_second_finish_is_tried() -> None:
     u = gu.unfold(points)
     rows = u.summary()["method"]["finishes"]
     assert [row["horizons"] for row in rows] == ["close", "bold"]
+    assert [row["blocks_lost"] for row in rows] == [0, 0]
     assert rows[0]["word"] == "poor"
     assert u.trust is not None
     assert u.trust.word != "poor"

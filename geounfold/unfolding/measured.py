@@ -91,7 +91,7 @@ def measure(
     check_coordinates(quality, returned, P, options)
     check_torn(torn, P, options)
     with stage("trust"):
-        trust = _trust(mapping, fits, carried, P, frame)
+        trust = _trust(mapping, prepared, fits, carried)
     check_trust(trust, options)
     return Measured(carried, returned, certificate, quality, torn, trust)
 
@@ -103,16 +103,18 @@ def in_world(control: ControlMesh, frame: Frame) -> ControlMesh:
 
 def _trust(
     mapping: UnfoldingMap | PointwiseMap,
+    prepared: PreparedPoints,
     fits: Sequence[BodyFit],
     carried: Carried,
-    points: Floats,
-    frame: Frame,
 ) -> Trust | None:
     """Return how far to trust the layers of all bodies; None without a control mesh."""
     if isinstance(mapping, PointwiseMap):
         return None
+    frame = prepared.frame
     signs = [fit.signs or _signs_of(fit, mapping, frame) for fit in fits]
-    return judge(signs, frame, points, carried.stratigraphic)
+    kind = "body" if prepared.division is None else "part"
+    names = [f"{kind} {number}" for number in range(len(fits))] if len(fits) > 1 else [""]
+    return judge(signs, names, frame, prepared.points, carried.stratigraphic)
 
 
 def _signs_of(fit: BodyFit, mapping: UnfoldingMap, frame: Frame) -> Signs:

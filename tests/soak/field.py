@@ -27,21 +27,19 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import multiprocessing as mp
 import os
 import re
 import resource
 import sys
 import time
-import traceback
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
-from multiprocessing.connection import Connection, wait
+from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pool import Job, finished, load_libraries, place_of, started
 from soak import option, say
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -79,16 +77,6 @@ class Row:
     parts: int = 0  # of the answer
     warnings: str = ""
     message: str = ""
-
-
-@dataclass
-class Job:
-    """A body under way in a process."""
-
-    process: mp.process.BaseProcess
-    pipe: Connection
-    row: Row
-    start: float = field(default_factory=time.monotonic)
 
 
 # ---------------------------------------------------------------- one body
@@ -191,22 +179,19 @@ def unfolded(row: Row, seed: int, options: dict[str, Any]) -> None:
     judge(row, body, u)
 
 
-def worker(pipe: Connection, row: Row, args: argparse.Namespace) -> None:
-    """Unfold one body under a memory limit, and send its row."""
-    if args.memory:
-        resource.setrlimit(resource.RLIMIT_AS, (args.memory << 20, args.memory << 20))
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, 1)
-    os.dup2(devnull, 2)
+def work(row: Row, seed: int, options: dict[str, Any]) -> None:
+    """Unfold one body and fill in its row, whatever comes of it."""
     try:
-        unfolded(row, args.seed, dict(args.options))
+        unfolded(row, seed, options)
     except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        row.message = (
-            f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
-        )
-    pipe.send(row)
-    pipe.close()
+        row.message = f"{type(error).__name__}: {error} ({place_of(error)})"
+
+
+def stopped(row: Row, how: str, message: str) -> None:
+    """Fill in the row of a body that did not end by itself."""
+    row.message = message
+    if how == "timeout":
+        row.outcome = row.verdict = how
 
 
 # ---------------------------------------------------------------- many
@@ -214,12 +199,10 @@ def worker(pipe: Connection, row: Row, args: argparse.Namespace) -> None:
 
 def run(args: argparse.Namespace) -> list[Row]:
     """Unfold the chosen bodies; return their rows in the suite's order."""
-    # Loaded once, before the processes part: a process then costs milliseconds.
-    import igl  # noqa: F401, TID251
-    import pymeshlab  # noqa: F401, TID251
-
     from geounfold.synthetic.field_bodies import FIELD_BODIES
 
+    load_libraries()
+    task = partial(work, seed=args.seed, options=dict(args.options))
     chosen = [
         Row(body.name, body.family, body.expects)
         for body in FIELD_BODIES.values()
@@ -236,8 +219,8 @@ def run(args: argparse.Namespace) -> list[Row]:
         try:
             while chosen or jobs:
                 while chosen and len(jobs) < args.jobs:
-                    jobs.append(started(chosen.pop(0), args))
-                for row in finished(jobs, args.seconds):
+                    jobs.append(started(task, chosen.pop(0), args.memory))
+                for row in finished(jobs, args.seconds, stopped):
                     rows.append(row)
                     writer.writerow(asdict(row))
                     file.flush()
@@ -246,40 +229,6 @@ def run(args: argparse.Namespace) -> list[Row]:
             for job in jobs:
                 job.process.kill()
     return sorted(rows, key=lambda row: order.index(row.name))
-
-
-def started(row: Row, args: argparse.Namespace) -> Job:
-    """Return a body's process, running."""
-    context = mp.get_context("fork")
-    mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=worker, args=(theirs, row, args))
-    process.start()
-    theirs.close()
-    return Job(process, mine, row)
-
-
-def finished(jobs: list[Job], seconds: float) -> Iterator[Row]:
-    """Wait for bodies to end; yield their rows and take them off the list."""
-    wait([job.pipe for job in jobs], timeout=0.5)
-    for job in list(jobs):
-        late = time.monotonic() - job.start > seconds
-        if not (late or job.pipe.poll()):
-            continue
-        jobs.remove(job)
-        row = job.row
-        try:
-            if job.pipe.poll():
-                row = job.pipe.recv()
-            else:
-                row.outcome = row.verdict = "timeout"
-                row.message, row.seconds = f"stopped after {seconds:.0f} s", seconds
-        except EOFError:
-            job.process.join()
-            row.message = f"the process ended with status {job.process.exitcode}"
-        job.process.kill()
-        job.process.join()
-        job.pipe.close()
-        yield row
 
 
 def line(row: Row) -> str:

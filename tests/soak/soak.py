@@ -25,20 +25,18 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import multiprocessing as mp
 import os
 import resource
 import sys
 import time
-import traceback
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
-from multiprocessing.connection import Connection, wait
+from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pool import Job, finished, load_libraries, place_of, started
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTCOMES = ("ok", "uncertified", "refused", "crash")
@@ -69,16 +67,6 @@ class Row:
     round_trip: float = NAN
     options: str = "{}"
     description: str = ""
-
-
-@dataclass
-class Job:
-    """A body under way in a process."""
-
-    process: mp.process.BaseProcess
-    pipe: Connection
-    row: Row
-    start: float = field(default_factory=time.monotonic)
 
 
 # ---------------------------------------------------------------- one body
@@ -139,26 +127,22 @@ def failing(row: Row, u: Any) -> tuple[str, str]:
     return ("blocks without image", f"{unplaced} blocks") if unplaced else ("", "")
 
 
-def worker(pipe: Connection, row: Row, options: dict[str, Any], memory: int) -> None:
-    """Unfold one body under a memory limit, and send its row."""
+def work(row: Row, options: dict[str, Any]) -> None:
+    """Unfold one body and fill in its row, whatever comes of it."""
     from geounfold.errors import GeounfoldError
 
-    if memory:
-        resource.setrlimit(resource.RLIMIT_AS, (memory << 20, memory << 20))
-    devnull = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(devnull, 1)
-    os.dup2(devnull, 2)
     try:
         unfolded(row, options)
     except GeounfoldError as error:
         row.outcome, row.reason, row.message = "refused", type(error).__name__, str(error)
     except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        row.reason = type(error).__name__
-        row.message = f"{error} ({Path(where.filename).name}:{where.lineno})"
+        row.reason, row.message = type(error).__name__, f"{error} ({place_of(error)})"
     row.peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    pipe.send(row)
-    pipe.close()
+
+
+def stopped(row: Row, how: str, message: str) -> None:
+    """Fill in the row of a body that did not end by itself."""
+    row.reason, row.message = how, message
 
 
 # ---------------------------------------------------------------- many
@@ -166,18 +150,14 @@ def worker(pipe: Connection, row: Row, options: dict[str, Any], memory: int) -> 
 
 def run(args: argparse.Namespace, rows: list[Row], path: Path) -> list[Row]:
     """Unfold the seeds that have no row yet until the time is up; return all rows."""
-    # Loaded once, before the processes part: a process then costs milliseconds.
-    import igl  # noqa: F401, TID251
-    import pymeshlab  # noqa: F401, TID251
-
-    import geounfold as gu
     from geounfold.synthetic import random_family
 
-    assert gu.__version__
+    load_libraries()
     done = {row.seed for row in rows}
     wanted = (s for s in range(args.seed, args.seed + args.bodies) if s not in done)
     seeds = (s for s in wanted if not args.family or random_family(s) in args.family)
     end = time.monotonic() + 60 * args.minutes
+    task = partial(work, options=args.options)
     jobs: list[Job] = []
     with path.open("a", newline="") as file:
         writer = csv.DictWriter(file, [f.name for f in fields(Row)])
@@ -189,10 +169,10 @@ def run(args: argparse.Namespace, rows: list[Row], path: Path) -> list[Row]:
                     seed = next(seeds, None)
                     if seed is None:
                         break
-                    jobs.append(started(Row(seed, random_family(seed)), args))
+                    jobs.append(started(task, Row(seed, random_family(seed)), args.memory))
                 if not jobs:
                     return rows
-                for row in finished(jobs, args.seconds):
+                for row in finished(jobs, args.seconds, stopped):
                     row.options = json.dumps(args.options, sort_keys=True)
                     rows.append(row)
                     writer.writerow(asdict(row))
@@ -201,42 +181,6 @@ def run(args: argparse.Namespace, rows: list[Row], path: Path) -> list[Row]:
         finally:
             for job in jobs:
                 job.process.kill()
-
-
-def started(row: Row, args: argparse.Namespace) -> Job:
-    """Return a body's process, running."""
-    context = mp.get_context("fork")
-    mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=worker, args=(theirs, row, args.options, args.memory))
-    process.start()
-    theirs.close()
-    return Job(process, mine, row)
-
-
-def finished(jobs: list[Job], seconds: float) -> Iterator[Row]:
-    """Wait for bodies to end; yield their rows and take them off the list."""
-    wait([job.pipe for job in jobs], timeout=0.5)
-    for job in list(jobs):
-        late = time.monotonic() - job.start > seconds
-        if not (late or job.pipe.poll()):
-            continue
-        jobs.remove(job)
-        row = job.row
-        try:
-            if job.pipe.poll():
-                row = job.pipe.recv()
-            else:
-                row.reason = "timeout"
-                row.message = f"stopped after {seconds:.0f} s"
-                row.seconds = seconds
-        except EOFError:
-            job.process.join()
-            row.reason = "killed"
-            row.message = f"the process ended with status {job.process.exitcode}"
-        job.process.kill()
-        job.process.join()
-        job.pipe.close()
-        yield row
 
 
 def tell(rows: list[Row]) -> None:

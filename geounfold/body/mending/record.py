@@ -53,6 +53,8 @@ class MendingRecord:
     ----------
     fate : (n,) int
         Index in `WORDS` for every point given; 0 if it is kept.
+    blocks : int
+        Number of points in the bodies.
     filled, cut, dropped, smoothed : int
         Number of lattice cells.
     handles_closed, handles_left : int
@@ -62,6 +64,7 @@ class MendingRecord:
     """
 
     fate: Ints
+    blocks: int = 0
     filled: int = 0
     cut: int = 0
     dropped: int = 0
@@ -96,6 +99,7 @@ class MendingRecord:
         """
         return cls(
             fate=np.where(rows >= 0, mended.fate[np.maximum(rows, 0)], 0),
+            blocks=int((rows >= 0).sum()),
             filled=len(mended.filled),
             cut=mended.count("cut"),
             dropped=mended.count("dropped"),
@@ -107,7 +111,15 @@ class MendingRecord:
 
     def joined(self, other: MendingRecord) -> MendingRecord:
         """Return the record of the bodies of both; every point is in one body at most."""
-        counts = ("filled", "cut", "dropped", "smoothed", "handles_closed", "handles_left")
+        counts = (
+            "blocks",
+            "filled",
+            "cut",
+            "dropped",
+            "smoothed",
+            "handles_closed",
+            "handles_left",
+        )
         return MendingRecord(
             fate=np.maximum(self.fate, other.fate),
             places=(*self.places, *other.places),
@@ -131,7 +143,7 @@ class MendingRecord:
         `MOST_LEFT_OUT` of its blocks would be left out.
         """
         many = self.crude and self.handles_left > FEW
-        if many or self.left_out > MOST_LEFT_OUT * len(self.fate):
+        if many or self.left_out > MOST_LEFT_OUT * self.blocks:
             raise NoSheetError(self.too_crude())
 
     def too_crude(self) -> str:
@@ -139,7 +151,7 @@ class MendingRecord:
         largest = max(self.places, key=lambda place: place.cells)
         return (
             f"crude shell: {self.handles_left} handles left after {self.filled} cells were "
-            f"filled and {self.left_out} of {len(self.fate)} blocks left "
+            f"filled and {self.left_out} of {self.blocks} blocks left "
             f"out{self._at(largest.what)}; model the domain with a smoother boundary, or leave out "
             "the blocks of thin bridges and loose bits"
         )

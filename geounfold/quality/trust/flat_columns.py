@@ -50,10 +50,6 @@ class FlatColumns:
         out: Bools = np.isfinite(self.highest) & (self.depth > max(distance, _RIM * self.side))
         return out
 
-    def beside(self, field: Floats, axis: int) -> tuple[Floats, Floats]:
-        """Return a field's values in the columns before and after each along an axis."""
-        return np.roll(field, 1, axis), np.roll(field, -1, axis)
-
 
 def flat_columns(hull: CarriedHull, side: float) -> FlatColumns:
     """Return the columns that the hull's faces cross; holes of one column are closed.

@@ -103,6 +103,28 @@ class Criterion:
             return "poor"
         return "fair" if sign * value > sign * self.fair else "good"
 
+    def reason(
+        self, value: float, where: tuple[float, float, float] | None, blocks: int, of: str = ""
+    ) -> Reason | None:
+        """Return the reason that a value of the sign gives; None if it speaks for good.
+
+        Parameters
+        ----------
+        value : float
+            The sign.
+        where : (x, y, z) or None
+            The place, in the data's coordinates.
+        blocks : int
+            Number of blocks there.
+        of : str
+            Name of the body or part, if there are several.
+        """
+        word = self.word(value)
+        if word == "good":
+            return None
+        what = self.what.format(value)
+        return Reason(f"{of}: {what}" if of else what, where, blocks, self.do, word)
+
     def excess(self, value: float) -> float:
         """Return the value over the poor one: how bad it is, comparable among criteria."""
         if not np.isfinite(value):
@@ -184,13 +206,21 @@ def score(signs: Signs) -> tuple[int, float]:
     return WORDS.index(grade(signs)), excess
 
 
-def judge(bodies: Sequence[Signs], frame: Frame, points: Floats, stratigraphic: Floats) -> Trust:
+def judge(
+    bodies: Sequence[Signs],
+    names: Sequence[str],
+    frame: Frame,
+    points: Floats,
+    stratigraphic: Floats,
+) -> Trust:
     """Return the trust of a run: that of its worst body, with the reasons of all.
 
     Parameters
     ----------
     bodies : sequence of Signs
-        One per body, working units.
+        One per body, or per sheet part of them, working units.
+    names : sequence of str
+        What the reasons call each; empty if there is one.
     frame : Frame
         Converts places to the data's coordinates.
     points : (n, 3) float
@@ -198,31 +228,24 @@ def judge(bodies: Sequence[Signs], frame: Frame, points: Floats, stratigraphic: 
     stratigraphic : (n,) float
         Their levels; NaN for those without an image.
     """
-    found: list[tuple[float, Reason]] = []
-    for number, signs in enumerate(bodies):
+    found: list[tuple[float, Reason | None]] = []
+    for signs, name in zip(bodies, names, strict=True):
         for criterion in CRITERIA:
             value = getattr(signs, criterion.name)
-            word = criterion.word(value)
-            if word == "good":
-                continue
             place = signs.places.get(criterion.name)
-            where, blocks = None, 0
-            if place is not None:
-                x, y, z = frame.to_world(place.folded[None])[0]
-                where, blocks = (float(x), float(y), float(z)), round(place.volume)
-            what = criterion.what.format(value)
-            if len(bodies) > 1:
-                what = f"body {number}: {what}"
-            reason = Reason(what, where, blocks, criterion.do, word)
-            found.append((WORDS.index(word) * 1e6 + criterion.excess(value), reason))
+            where = None if place is None else _place(frame.to_world(place.folded[None])[0])
+            blocks = 0 if place is None else round(place.volume)
+            found.append((criterion.excess(value), criterion.reason(value, where, blocks, name)))
     beyond = (stratigraphic < _BEYOND[0]) | (stratigraphic > _BEYOND[1])
-    share = float(beyond.mean())
-    if OUT.word(share) != "good":
-        x, y, z = np.median(points[beyond], axis=0)
-        where = (float(x), float(y), float(z))
-        word = OUT.word(share)
-        reason = Reason(OUT.what.format(share), where, int(beyond.sum()), OUT.do, word)
-        found.append((WORDS.index(word) * 1e6 + OUT.excess(share), reason))
-    found.sort(key=lambda pair: -pair[0])
-    reasons = tuple(reason for _, reason in found)
-    return Trust(max((r.word for r in reasons), key=WORDS.index, default="good"), reasons)
+    share, count = float(beyond.mean()), int(beyond.sum())
+    where = _place(np.median(points[beyond], axis=0)) if count else None
+    found.append((OUT.excess(share), OUT.reason(share, where, count)))
+    told = [(excess, reason) for excess, reason in found if reason is not None]
+    told.sort(key=lambda pair: (-WORDS.index(pair[1].word), -pair[0]))
+    return Trust(told[0][1].word if told else "good", tuple(reason for _, reason in told))
+
+
+def _place(point: Floats) -> tuple[float, float, float]:
+    """Return a point (3,) as plain numbers."""
+    x, y, z = point.tolist()
+    return x, y, z

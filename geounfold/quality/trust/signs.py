@@ -103,6 +103,10 @@ class Signs:
         return {name: value if np.isfinite(value) else None for name, value in values.items()}
 
 
+_NOTHING_CARRIED = Signs(1.0, 1.0, 1.0, np.nan, np.nan, np.nan, np.nan, 1.0, {})
+"""The signs of a map that carries no face of the hull: no face lies where it should."""
+
+
 def measure_signs(
     hull: TriMesh, mapping: UnfoldingMap, side: float, *, over_mid: bool = True
 ) -> Signs:
@@ -121,13 +125,16 @@ def measure_signs(
     """
     side = max(1.0, side)
     faces = carry_hull(hull, mapping)
+    if not len(faces.level):
+        return _NOTHING_CARRIED
     columns = flat_columns(faces, _COLUMN * side)
     ends, _ = _off(faces, columns, _OBLIQUE)
     off, thickness = _off(faces, columns, _LEVEL)
     stretch, area = faces.stretch(ends.rows)
     length = _Share(ends.rows, stretch > _STRETCHED, area)
     within = columns.within(thickness / 2)
-    left, stepped = _left_by_mid(columns) & within, _stepped(columns, within, side)
+    left = within & ((columns.lowest > _BEYOND) | (columns.highest < -_BEYOND))
+    stepped, longest = _stepped(columns, within, side)
     width = float(2 * columns.depth.max() - columns.side)
     at = columns.of(faces.flat_centre)
     bad = {
@@ -141,10 +148,8 @@ def measure_signs(
         off=off.value,
         length=length.value,
         ends=ends.value,
-        level=_share(left, within) if over_mid else float("nan"),
-        step=_longest(stepped) * columns.side / max(width, columns.side)
-        if over_mid
-        else float("nan"),
+        level=float(left.sum() / max(within.sum(), 1)) if over_mid else np.nan,
+        step=longest / max(width, columns.side) if over_mid else np.nan,
         breadth=width / thickness,
         thickness=thickness,
         lost=faces.lost,
@@ -187,38 +192,25 @@ def _off(faces: CarriedHull, columns: FlatColumns, least: float) -> tuple[_Share
     return _Share(rows, miss > np.maximum(_OFF[0], _OFF[1] * own), area[rows]), thickness
 
 
-def _share(bad: Bools, among: Bools) -> float:
-    return float(bad.sum() / max(int(among.sum()), 1))
+def _stepped(columns: FlatColumns, within: Bools, side: float) -> tuple[Bools, float]:
+    """Return the columns on the longest line along which top or bottom steps, and its length.
 
-
-def _left_by_mid(columns: FlatColumns) -> Bools:
-    """Return the columns in which the mid surface, height 0, lies outside the body, (r, c)."""
-    out: Bools = (columns.lowest > _BEYOND) | (columns.highest < -_BEYOND)
-    return out
-
-
-def _stepped(columns: FlatColumns, within: Bools, side: float) -> Bools:
-    """Return the columns on the longest line along which the top or the bottom steps, (r, c)."""
-    found = np.zeros(within.shape, bool)
+    The length is the larger extent of the line along the columns' axes, working units.
+    """
+    found, longest = np.zeros(within.shape, bool), 0
     high, low = (np.where(within, h, np.nan) for h in (columns.highest, columns.lowest))
     for horizon in (high, low):
         steps = np.zeros(within.shape, bool)
         for axis in (0, 1):
-            before, after = columns.beside(horizon, axis)
-            thick = np.fmax(*columns.beside(high - low, axis))
-            steps |= np.abs(after - before) > np.maximum(_STEP[0] * side, _STEP[1] * thick)
-        line, count = ndimage.label(steps, np.ones((3, 3)))
-        if count:
-            extents = [max(s.stop - s.start for s in box) for box in ndimage.find_objects(line)]
-            longest = line == 1 + int(np.argmax(extents))
-            found = longest if _longest(longest) > _longest(found) else found
-    return found
-
-
-def _longest(line: Bools) -> int:
-    """Return how many columns a line is long."""
-    rows, columns = np.nonzero(line)
-    return max(int(np.ptp(rows)), int(np.ptp(columns))) + 1 if len(rows) else 0
+            rise = np.roll(horizon, -1, axis) - np.roll(horizon, 1, axis)
+            thick = np.fmax(np.roll(high - low, -1, axis), np.roll(high - low, 1, axis))
+            steps |= np.abs(rise) > np.maximum(_STEP[0] * side, _STEP[1] * thick)
+        line, _ = ndimage.label(steps, np.ones((3, 3)))
+        for number, box in enumerate(ndimage.find_objects(line), 1):
+            extent = max(s.stop - s.start for s in box)
+            if extent > longest:
+                found, longest = line == number, extent
+    return found, longest * columns.side
 
 
 def _median(values: Floats, weights: Floats) -> float:

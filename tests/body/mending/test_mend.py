@@ -11,7 +11,7 @@ from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending import voxels as voxels_module
 from geounfold.body.mending.euler import euler_number
 from geounfold.body.mending.mend import Mended
-from geounfold.body.mending.record import MendedPlace
+from geounfold.body.mending.record import MendedPlace, places_of
 from geounfold.body.prepare import prepare
 from geounfold.errors import NoSheetError
 from geounfold.synthetic import CASES
@@ -167,7 +167,7 @@ def test_gaps_of_an_incomplete_body_are_filled_and_told():
 
 def record(**counts):
     """Return the record of a body of 100 blocks."""
-    return MendingRecord(np.zeros(100, np.int64), **counts)
+    return MendingRecord(np.zeros(100, np.int64), blocks=100, **counts)
 
 
 def test_body_with_many_handles_left_is_refused():
@@ -224,4 +224,15 @@ def test_body_of_which_much_is_left_out_is_refused():
     place = MendedPlace("smoothed", 4, (10.0, 20.0, 30.0))
     found = record(filled=3, cut=2, smoothed=4, places=(place,))
     with pytest.raises(NoSheetError, match=r"6 of 100 blocks left out, most around \(10, 20, 30\)"):
+        found.check()
+
+
+def test_share_left_out_is_of_the_bodys_own_blocks():
+    layer = box((12, 10, 3))
+    mended = Mended(np.zeros((0, 3), np.int64), np.r_[np.full(40, 3), np.zeros(320, int)], 0, 0)
+    rows = np.r_[np.arange(360), np.full(5000, -1)]  # another body of 5,000 blocks beside it
+    place = places_of("smoothed", layer[:40], layer[:40] * 1.0)
+    found = MendingRecord.of(mended, rows, place)
+    assert found.blocks == 360
+    with pytest.raises(NoSheetError, match="40 of 360 blocks left out"):
         found.check()

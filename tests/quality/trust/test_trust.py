@@ -13,7 +13,7 @@ import geounfold as gu
 from geounfold.cli import main
 from geounfold.errors import OptionError, TrustError
 from geounfold.geometry.mesh import Floats
-from geounfold.quality.trust import Trust, grade, score
+from geounfold.quality.trust import Trust, grade, judge, measure_signs, score
 from geounfold.quality.trust.judge import CRITERIA, NEVER, Criterion
 from geounfold.quality.trust.signs import Signs
 from tests.shapes import box, turned
@@ -206,3 +206,26 @@ def test_few_blocks_out_of_reach_are_left_empty_and_told() -> None:
     assert np.isnan(empty.stratigraphic[[3, 7]]).all()
     assert np.flatnonzero(~empty.placed).tolist() == [3, 7]
     assert body.carried.placed.all()  # the original stays as it was
+
+
+def test_a_hull_that_the_map_does_not_carry_is_poor() -> None:
+    u = gu.unfold(box(24, 20, 5))
+    hull = u.fits[0].split.mesh
+    signs = measure_signs(hull.with_vertices(hull.V + 1e3), u.map, 1.0)
+    assert (signs.lost, grade(signs)) == (1.0, "poor")
+    assert signs.figures()["breadth"] is None
+
+
+def test_reasons_name_the_part_and_come_worst_first() -> None:
+    frame = gu.unfold(box(24, 20, 5)).frame
+    level, points = np.array([0.2, 0.8, 1.4]), np.arange(9.0).reshape(3, 3)
+    trust = judge(
+        [_signs(off=0.02), _signs(length=0.5)], ["part 0", "part 1"], frame, points, level
+    )
+    assert trust.word == "poor"
+    assert [r.word for r in trust.reasons] == ["poor", "poor", "fair"]
+    # A third of the blocks lies beyond: 11 times the poor limit; the lengths 4 times theirs.
+    assert trust.reasons[0].what.startswith("33.3% of the blocks")
+    assert (trust.reasons[0].where, trust.reasons[0].blocks) == ((6.0, 7.0, 8.0), 1)
+    assert trust.reasons[1].what.startswith("part 1: lengths change")
+    assert trust.reasons[2].what.startswith("part 0: 2.0% of the body's top")

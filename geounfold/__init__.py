@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
     from geounfold.quality.truth import aligned_rms
     from geounfold.synthetic import simulate
+    from geounfold.synthetic.faulted import simulate_faulted
     from geounfold.unfolding.dask_map import map_partitions
     from geounfold.unfolding.options import UnfoldOptions
     from geounfold.unfolding.result import Unfolding
@@ -82,6 +83,7 @@ _HOMES = {
     "neighbours": "quality",
     "nmd": "quality",
     "simulate": "synthetic",
+    "simulate_faulted": "synthetic.faulted",
 }
 
 __all__ = [
@@ -121,6 +123,7 @@ __all__ = [
     "read_drillholes",
     "regular_grid",
     "simulate",
+    "simulate_faulted",
     "transfer",
     "unfold",
 ]

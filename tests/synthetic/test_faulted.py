@@ -158,6 +158,16 @@ def test_walls_of_a_slip_are_one_rock(bodies: dict[str, FaultedBody], name: str)
             # Older faults tear rock on their own surfaces: a vertex may lie within rounding of one.
             near = np.abs(flat - slip.flat).max(axis=1) < 1e-6
             assert near.mean() > 0.99
+        assert slip.blocks.min() >= 0
+        # Blocks of a wall's own fault block lie beside it, more than half of them within a block.
+        for column, wall in enumerate((slip.footwall, slip.hanging_wall)):
+            off = np.full(len(wall), np.inf)
+            for block in np.unique(slip.blocks[:, column]):
+                rows = slip.blocks[:, column] == block
+                tree = cKDTree(body.folded[body.fault_block == block])
+                off[rows] = tree.query(wall[rows])[0]
+            assert np.median(off) < max(body.spec.steps)
+            assert off.max() < 3 * max(body.spec.steps)
 
 
 def test_a_network_has_a_block_for_each_combination(bodies: dict[str, FaultedBody]) -> None:

@@ -22,11 +22,14 @@ class TrueSlip:
         Flat coordinates of the rock.
     footwall, hanging_wall : (n, 3) float
         Where its two halves are.
+    blocks : (n, 2) int
+        Fault blocks of footwall and hanging wall; -1 if the body has no block there.
     """
 
     flat: Floats
     footwall: Floats
     hanging_wall: Floats
+    blocks: Ints
 
     @property
     def vectors(self) -> Floats:

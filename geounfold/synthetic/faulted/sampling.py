@@ -56,15 +56,15 @@ def sample(name: str, spec: FaultedSpec) -> FaultedBody:
     if not len(blocks.folded):
         raise OptionError(f"no block of {name} lies in the body; make steps smaller")
     offset = np.array(spec.offset, float)
+    fault_block, sides = _by_size(blocks.sides)
     surfaces, slips = {}, {}
     for k, fault in spec.faults_by_index.items():
-        (V, F), slip = fault_surface(spec, k, blocks.folded, offset)
-        surfaces[fault.name], slips[fault.name] = (V + offset, F), slip
+        surfaces[fault.name], slips[fault.name] = fault_surface(spec, k, blocks.folded, sides)
     return FaultedBody(
         name=name,
         folded=blocks.folded + offset,
         truth=blocks.truth,
-        fault_block=_by_size(blocks.sides),
+        fault_block=fault_block,
         sizes=blocks.sizes,
         surfaces=surfaces,
         slips=slips,
@@ -72,13 +72,13 @@ def sample(name: str, spec: FaultedSpec) -> FaultedBody:
     )
 
 
-def _by_size(sides: Bools) -> Ints:
-    """Return fault blocks (n,) of equal sides (n, faults), 0 for the largest."""
-    _, block, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+def _by_size(sides: Bools) -> tuple[Ints, Bools]:
+    """Return fault blocks (n,) of equal sides (n, faults), 0 for the largest, and their sides."""
+    found, block, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(-count, kind="stable")
     rank = np.empty(len(count), np.int64)
-    rank[np.argsort(-count, kind="stable")] = np.arange(len(count))
-    out: Ints = rank[block.ravel()]
-    return out
+    rank[order] = np.arange(len(count))
+    return rank[block.ravel()], found[order]
 
 
 def _box(spec: FaultedSpec) -> tuple[Floats, Floats]:
@@ -129,7 +129,7 @@ def _sub_blocked(spec: FaultedSpec) -> _Blocks:
     shape = tuple((parents.max(axis=0) - low + 1).tolist())
     keys = np.ravel_multi_index(tuple((parents - low).T), shape)
     found, group, count = np.unique(keys, return_inverse=True, return_counts=True)
-    block = _by_size(small.sides)
+    block, _ = _by_size(small.sides)
     mixed = np.zeros(len(found), bool)
     first = np.full(len(found), -1)
     first[group] = block  # one of the parent's sub-blocks

@@ -7,15 +7,15 @@ import numpy as np
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.synthetic.faulted.body import Surface, TrueSlip
 from geounfold.synthetic.faulted.events import Fault, FoldEvent, TipFault
-from geounfold.synthetic.faulted.recipe import FaultedSpec, Sides
+from geounfold.synthetic.faulted.recipe import FaultedSpec, Sides, blocks_of
 
 _SIDE = 0.8  # of a triangle, in blocks
 _PAST = 9.0  # blocks by which a surface reaches past the body
 _NEAR = 12.0  # blocks from the surface: the part of the body that sets its extent
 
 
-def fault_surface(spec: FaultedSpec, k: int, X: Floats, offset: Floats) -> tuple[Surface, TrueSlip]:
-    """Return a fault's surface in final space, without offset, and the slip at its vertices.
+def fault_surface(spec: FaultedSpec, k: int, X: Floats, sides: Bools) -> tuple[Surface, TrueSlip]:
+    """Return a fault's surface in final space and the slip at its vertices.
 
     Parameters
     ----------
@@ -25,17 +25,18 @@ def fault_surface(spec: FaultedSpec, k: int, X: Floats, offset: Floats) -> tuple
         Index of the fault among the events.
     X : (n, 3) float
         Blocks in final space, without offset.
-    offset : (3,) float
-        Added to both walls of the slip.
+    sides : (fault blocks, faults) bool
+        Sides of the faults on which each fault block lies.
     """
     fault = spec.faults_by_index[k]
     V, F = _grid(fault, *_extent(spec, k, fault, X), _SIDE * spec.step)
     if fault.within:
         F = F[spec.exists(k, V)[F].all(axis=1)]
-    slip = _true_slip(spec, k, fault, V, offset)
+    slip = _true_slip(spec, k, fault, V, sides)
     for j in range(k + 1, len(spec.events)):
         V, F = _through(spec, j, V, F)
-    return _compact(V, F), slip
+    V, F = _compact(V, F)
+    return (V + np.array(spec.offset, float), F), slip
 
 
 def _extent(spec: FaultedSpec, k: int, fault: Fault, X: Floats) -> tuple[Floats, Floats]:
@@ -63,22 +64,29 @@ def _grid(fault: Fault, low: Floats, high: Floats, side: float) -> Surface:
     )
 
 
-def _true_slip(spec: FaultedSpec, k: int, fault: Fault, V: Floats, offset: Floats) -> TrueSlip:
+def _true_slip(spec: FaultedSpec, k: int, fault: Fault, V: Floats, blocks: Bools) -> TrueSlip:
     """Return both places of the rock at the surface's vertices that lie in the layer."""
     W, kept, sides = spec.before(V, k, 0)
-    kept = kept & spec.holds(W)
+    kept = kept & spec.holds(W) & spec.exists(k, V)
     known: Sides = {name: side[kept] for name, side in sides.items()}
     walls, later = [], []
+    inside = np.ones(int(kept.sum()), bool)
     for hanging, P in ((False, V[kept]), (True, fault.forward(V[kept]))):
         here = known | {fault.name: np.full(len(P), hanging)}
         X, every = spec.forward(P, k + 1, here)
-        walls.append(X + offset)
-        later.append(every)
-    same = np.ones(int(kept.sum()), bool)
-    for name in later[0]:
-        if name != fault.name:
-            same &= later[0][name] == later[1][name]
-    return TrueSlip(W[kept][same], walls[0][same], walls[1][same])
+        inside &= spec.in_model(X)
+        walls.append(X + np.array(spec.offset, float))
+        later.append(blocks_of(every, [other.name for other in spec.faults]))
+    own = [other.name for other in spec.faults].index(fault.name)
+    same = inside & np.delete(later[0] == later[1], own, axis=1).all(axis=1)
+    ids = np.stack([_block(side[same], blocks) for side in later], axis=1)
+    return TrueSlip(W[kept][same], walls[0][same], walls[1][same], ids)
+
+
+def _block(sides: Bools, blocks: Bools) -> Ints:
+    """Return the fault block (n,) of points by their sides (n, faults); -1 for none."""
+    equal = (sides[:, None] == blocks).all(axis=2)
+    return np.where(equal.any(axis=1), equal.argmax(axis=1), -1)
 
 
 def _through(spec: FaultedSpec, j: int, V: Floats, F: Ints) -> Surface:

@@ -237,7 +237,7 @@ class DrillHoles:
         }
 
 
-def read_drillholes(
+def read_drillholes(  # 9 arguments: a public name; six of them are choices by keyword
     collar: str | Path | pd.DataFrame,
     survey: str | Path | pd.DataFrame,
     assay: str | Path | pd.DataFrame,
@@ -247,6 +247,7 @@ def read_drillholes(
     dip_positive_down: bool | None = None,
     strict: bool = False,
     drop_invalid: bool = False,
+    where: str | None = None,
 ) -> DrillHoles:
     """Return drill-holes from their three tables, checked and desurveyed.
 
@@ -270,6 +271,8 @@ def read_drillholes(
     drop_invalid : bool, optional
         Leave out the holes that have assays but cannot be placed (no collar, two collars, no
         survey) instead of raising.
+    where : str, optional
+        Chooses rows of the assay table, such as ``"LITH=QZ and AU>0.2"``.
 
     Raises
     ------
@@ -291,7 +294,7 @@ def read_drillholes(
     log = Log()
     names = dict(columns or {})
     tables = {
-        kind: read_hole_table(kind, given, names, log)
+        kind: read_hole_table(kind, given, names, log, where if kind == "assay" else None)
         for kind, given in (("collar", collar), ("survey", survey), ("assay", assay))
     }
     check_fields(names, tables)

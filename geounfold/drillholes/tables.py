@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,9 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.column_values import objects, unique_names
 from geounfold.io.coordinate_columns import plain_name, readable_numbers
 from geounfold.io.messages import listing, shown
+from geounfold.io.selection import read_where
 from geounfold.io.tables.files import Table, read_table
+from geounfold.io.tables.points import chosen_rows
 
 HOLE = "hole"
 _HOLE = (
@@ -103,7 +105,11 @@ class HoleTable:
 
 
 def read_hole_table(
-    kind: str, given: str | Path | pd.DataFrame, columns: Mapping[str, str], log: Log
+    kind: str,
+    given: str | Path | pd.DataFrame,
+    columns: Mapping[str, str],
+    log: Log,
+    where: str | None = None,
 ) -> HoleTable:
     """Return one of the three tables; rows without a hole's name are left out.
 
@@ -118,11 +124,14 @@ def read_hole_table(
         tables are ignored.
     log : Log
         Collects the findings.
+    where : str, optional
+        Chooses rows; the others are as if they were not there.
 
     Raises
     ------
     InputError
-        The file does not exist, a column is missing or ambiguous, or no row names a hole.
+        The file does not exist, `where` chooses no row, a column is missing or ambiguous, or no
+        row names a hole.
     """
     if isinstance(given, pd.DataFrame):
         source, table = f"the {kind} table", Table(given.reset_index(drop=True), text=False)
@@ -131,11 +140,15 @@ def read_hole_table(
     else:
         source, table = str(given), read_table(given)
     names = [str(name) for name in table.frame.columns]
-    where = _fields(kind, names, columns, source)
-    hole = _hole_names(table.frame.iloc[:, where[HOLE]])
-    row = np.arange(1, len(hole) + 1)
+    fields = _fields(kind, names, columns, source)
+    row = np.arange(1, len(table.frame) + 1)
+    if where is not None:
+        chosen = chosen_rows(read_where(where), table.frame, source)
+        table = replace(table, frame=table.frame.loc[chosen].reset_index(drop=True))
+        row = row[chosen]
+    hole = _hole_names(table.frame.iloc[:, fields[HOLE]])
     values: dict[str, Floats] = {}
-    for field, position in where.items():
+    for field, position in fields.items():
         if field == HOLE:
             continue
         column = table.frame.iloc[:, position]
@@ -147,14 +160,14 @@ def read_hole_table(
                 source, f"{field} is not a number, or too large", WARNING, "taken as missing",
                 hole=str(hole[i]), row=int(row[i]), detail=f"'{shown(column.iloc[i])}'",
             )  # fmt: skip
-    rest = table.frame.iloc[:, [i for i in range(len(names)) if i not in where.values()]]
+    rest = table.frame.iloc[:, [i for i in range(len(names)) if i not in fields.values()]]
     rest = rest.set_axis(pd.Index(unique_names(rest.columns), dtype=object), axis=1)
     whole = HoleTable(source, hole, values, rest, row, tuple(names))
     named = hole != ""
     for i in np.flatnonzero(~named):
         log.add(source, "no hole named", WARNING, "left out", row=int(row[i]))
     if not named.any():
-        raise InputError(f"{source}: no row names a hole in column '{names[where[HOLE]]}'")
+        raise InputError(f"{source}: no row names a hole in column '{names[fields[HOLE]]}'")
     return whole.kept(named)
 
 

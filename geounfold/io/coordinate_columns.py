@@ -64,7 +64,8 @@ _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+|[+-]?\d+,\d+")
 
-_MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
+MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
+"""Words, in any letter case, that mean no value."""
 
 
 def plain_name(name: object) -> str:
@@ -249,7 +250,7 @@ def _has_other_type(column: pd.Series) -> bool:
 def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
     """Return the numbers among texts, (n,), NaN for others, and a mask of those not missing."""
     words = pd.Series([str(value).strip() for value in text], dtype=object)
-    missing = words.str.casefold().isin(_MISSING).to_numpy()
+    missing = words.str.casefold().isin(MISSING).to_numpy()
     good = words.str.fullmatch(_NUMBER, case=False).to_numpy(dtype=bool)
     values = np.full(len(words), np.nan)
     values[good & ~missing] = words.to_numpy(dtype=object)[good & ~missing].astype(np.float64)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from geounfold.errors import OptionError
+
 _SHOWN = 12
 _LONGEST = 40
 
@@ -37,3 +39,8 @@ def counted(count: int, noun: str, plural: str | None = None) -> str:
 def rows_named(rows: Sequence[int]) -> str:
     """Return ``data row 4`` or ``data rows 4, 17, ...``; 1 is the first row after the header."""
     return f"data row{'s' if len(rows) > 1 else ''} {listing(rows)}"
+
+
+def no_elements(path: object) -> OptionError:
+    """Return the error for an element named of a file that holds no elements."""
+    return OptionError(f"{path}: --element chooses one of several elements, as OMF and geoh5 hold")

@@ -13,7 +13,8 @@ from geounfold.errors import BackendError, InputError, MeshError, OutputError
 from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh
 from geounfold.io.coordinate_columns import coordinate_columns, numbers
 from geounfold.io.formats import Surface, find_format, point_endings, surface_endings
-from geounfold.io.messages import listing, rows_named
+from geounfold.io.formats.elements import Kind, chosen
+from geounfold.io.messages import listing, no_elements, rows_named
 from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file
 from geounfold.io.tables.files import Table, read_table, write_table
 from geounfold.io.tables.points import PointTable, read_points
@@ -26,7 +27,7 @@ _STEEP = 0.1  # cosine of a triangle's angle with the mean plane below which it 
 _MOST_STEEP = 0.02  # share of upright triangles allowed; without an overhang there are none
 
 
-def read_surface(path: str | Path) -> TriMesh:
+def read_surface(path: str | Path, element: str | None = None) -> TriMesh:
     """Return the triangulated surface of a file.
 
     A table (.csv, .csv.gz, .parquet) holds one vertex per row. Row k also holds the vertex numbers
@@ -38,6 +39,8 @@ def read_surface(path: str | Path) -> TriMesh:
     ----------
     path : path
         A file with one of `SURFACE_ENDINGS`.
+    element : str, optional
+        Name of the surface to read, for a file of several (OMF, geoh5).
 
     Raises
     ------
@@ -47,10 +50,12 @@ def read_surface(path: str | Path) -> TriMesh:
     MissingDependencyError
         The format's library is not installed.
     """
-    return read_surface_with_meta(path)[0]
+    return read_surface_with_meta(path, element)[0]
 
 
-def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]]:
+def read_surface_with_meta(
+    path: str | Path, element: str | None = None
+) -> tuple[TriMesh, Mapping[str, str]]:
     """Return the surface of a file, and its unit and coordinate reference if it holds them."""
     path = Path(path)
     kind = ending(path)
@@ -62,10 +67,14 @@ def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]
     meta: Mapping[str, str] = {}
     try:
         found = find_format(kind, "reads_surface")
+        if element is not None and (found is None or not found.elements):
+            raise no_elements(path)
         if found is None:
             mesh = _from_table(path)
         else:
-            surface = found.load().read_surface(path)
+            module = found.load()
+            more = (element,) if found.elements else ()
+            surface = module.read_surface(path, *more)
             mesh, meta = TriMesh(surface.V, surface.F), surface.meta
     except (MeshError, BackendError) as error:
         raise InputError(f"{path}: is not a surface: {' '.join(str(error).split())}") from error
@@ -74,18 +83,28 @@ def read_surface_with_meta(path: str | Path) -> tuple[TriMesh, Mapping[str, str]
     return mesh, meta
 
 
-def holds_surface(path: str | Path) -> bool:
+def holds_surface(path: str | Path, element: str | None = None) -> bool:
     """Return whether a file is a surface, by its ending, or by its content if the ending is shared.
 
     Raises
     ------
     InputError
-        No such file.
+        No such file; or the file holds surfaces and points, and no element is named.
     """
     path = existing_file(Path(path))
     kind = ending(path)
     if kind not in MESH_ENDINGS or kind == ".ts" or kind not in point_endings():
         return kind in MESH_ENDINGS
+    found = find_format(kind, "reads_surface")
+    if found is not None and found.elements:
+        usable = (Kind.SURFACE, Kind.POINTS, Kind.BLOCKS)
+        try:
+            held = found.load().elements_of(path)
+        except InputError:
+            return False
+        return any(e.kind in usable for e in held) and (
+            chosen(path, held, usable, element).kind is Kind.SURFACE
+        )
     try:
         read_surface(path)
     except InputError:

@@ -11,8 +11,9 @@ import pandas as pd
 
 from geounfold.body.parts import Junction
 from geounfold.errors import OptionError
-from geounfold.geometry.mesh import Floats, Ints, Space, TriMesh, in_space
+from geounfold.geometry.mesh import Bools, Floats, Ints, Space, TriMesh, in_space
 from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, with_carried
+from geounfold.io.tables.parted import spread_columns
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
 from geounfold.surfaces.hull import Hull
@@ -33,7 +34,7 @@ class Unfolding:
     Attributes
     ----------
     folded : (n, 3) float
-        The points as given.
+        The points as given; those of the rows chosen, if the user chose some.
     points : (n, 3) float
         The points unfolded, in the same order; z is the stratigraphic coordinate.
     stratigraphic : (n,) float
@@ -59,11 +60,19 @@ class Unfolding:
         How far to trust the layers: good, fair or poor, with reasons; None without a control mesh.
     seconds : dict of float
         Per stage.
+    chosen : (m,) bool or None
+        Rows of the DataFrame given that are the body; None if all are.
     """
 
-    def __init__(self, record: RunRecord, given: pd.DataFrame | None = None) -> None:
-        """Keep a run's record, and the DataFrame that the points came in, if there was one."""
+    def __init__(
+        self,
+        record: RunRecord,
+        given: pd.DataFrame | None = None,
+        chosen: Bools | None = None,
+    ) -> None:
+        """Keep a run's record, the DataFrame that the points came in, and its rows chosen."""
         self._record = record
+        self.chosen = chosen
         self._given = None if given is None else given.copy()
         prepared, measured = record.prepared, record.measured
         self.options = record.options
@@ -130,13 +139,18 @@ class Unfolding:
         Index, columns, their order and types are as given; a column called as a result is
         replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
         stratigraphic, location, mesh_distance, those of ``columns`` and, if a body has several
-        sheets, body_part.
+        sheets, body_part. Rows that were not chosen have empty results and the location
+        ``not selected``.
         """
         given = self._given
         if given is None:
             given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
         parts = {"body_part": self.body_part} if self.junctions else {}
-        return given.assign(**result_columns(UNFOLDED, self.carried), **self.columns, **parts)
+        found = {**result_columns(UNFOLDED, self.carried), **self.columns, **parts}
+        if self.chosen is not None:
+            rows = np.flatnonzero(self.chosen)
+            found = spread_columns([(rows, found)], np.where(self.chosen, 0, -1))
+        return given.assign(**found)
 
     def to_flat(self, points: Floats) -> Floats:
         """Return other folded points (m, 3) in the flat space."""
@@ -211,7 +225,8 @@ class Unfolding:
 
         here, there, other = in_space(space, self.folded, self.points)
         keep = np.isfinite(here).all(axis=1)
-        columns = {str(name): _plain_column(c)[keep] for name, c in self.table.items()}
+        table = self.table if self.chosen is None else self.table.loc[self.chosen]
+        columns = {str(name): _plain_column(c)[keep] for name, c in table.items()}
         made = cloud(here[keep], columns)
         made.point_data[other] = there[keep]
         return made

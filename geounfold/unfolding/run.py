@@ -18,6 +18,8 @@ from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError
 from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
+from geounfold.io.selection import read_where
+from geounfold.io.tables.points import chosen_rows
 from geounfold.mapping.carried import checked_points
 from geounfold.mapping.certificate import certify
 from geounfold.mapping.control_mesh import side_by_side, vertex_parts
@@ -61,6 +63,7 @@ def unfold(
     top: TriMesh | tuple[Any, Any] | None = None,
     bottom: TriMesh | tuple[Any, Any] | None = None,
     progress: Progress | None = None,
+    where: str | None = None,
     **changes: Any,
 ) -> Unfolding:
     """Take the folds out of a body given by its block centroids.
@@ -77,6 +80,10 @@ def unfold(
         both or neither.
     progress : callable, optional
         Called with every stage's name as it starts.
+    where : str, optional
+        Chooses rows of a DataFrame, such as ``"ROCK=ORE and AU>0.2"``; see the command line's
+        ``--where``. The body is those rows alone; ``Unfolding.table`` has all rows, the others
+        empty.
     **changes
         Fields of UnfoldOptions given by name.
 
@@ -102,6 +109,12 @@ def unfold(
     """
     chosen = replace(options or UnfoldOptions(), **changes)
     check_method(chosen)
+    given, rows = points if isinstance(points, pd.DataFrame) else None, None
+    if where is not None:
+        if given is None:
+            raise InputError("where chooses rows by columns: give a DataFrame")
+        rows = chosen_rows(read_where(where), given, "the table")
+        points = given.loc[rows]
     clock = _Clock(progress)
     with clock.stage("frame"):
         divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
@@ -117,7 +130,7 @@ def unfold(
         mapping = _one_map(fits, prepared, chosen)
     measured = measure(mapping, prepared, fits, chosen, clock.stage)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
-    return Unfolding(record, points if isinstance(points, pd.DataFrame) else None)
+    return Unfolding(record, given, rows)
 
 
 @contextmanager

@@ -35,7 +35,9 @@ class FakeMap:
             distance=np.maximum(-points[:, 0], 0),
             unsolved=0,
         )
-        carried.part = lambda rows: carried if rows == slice(0, len(points)) else None
+        carried.part = lambda rows: SimpleNamespace(
+            **{k: v[rows] for k, v in vars(carried).items() if isinstance(v, np.ndarray)}
+        )
         return carried
 
 

@@ -15,12 +15,13 @@ if TYPE_CHECKING:
 
     from geounfold.cli.inputs.drillholes import HoleData
     from geounfold.io import PointTable
+    from geounfold.io.tables.parted import PartedTable
     from geounfold.report import CarriedHoles, CarriedPoints
 
 _XYZ = ("x", "y", "z")
 
 
-def report_columns(table: PointTable, results: Mapping[str, Any]) -> dict[str, Any]:
+def report_columns(table: PointTable | PartedTable, results: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of a result and of the table, by name, but for the coordinates read."""
     given = _known(table.frame, table.columns)
     return {**results, **{n: v for n, v in given.items() if n not in results}}

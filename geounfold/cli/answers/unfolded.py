@@ -11,6 +11,7 @@ from geounfold.cli.answers.report_data import report_columns, report_holes
 from geounfold.cli.inputs.body import BodyInputs
 from geounfold.io import PointTable, write_json
 from geounfold.io.result_columns import UNFOLDED, result_columns, world_columns
+from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -111,7 +112,7 @@ class UnfoldedBody:
         from geounfold.report import write_report
 
         body, result = self._body, self._result
-        table = cast(PointTable, body.table)  # a report's table is read whole
+        table = cast(PointTable | PartedTable, body.table)  # a report's table is read whole
         write_report(
             path,
             self.summary,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_command, add_frame
+from geounfold.cli.arguments.groups import add_command, add_element, add_frame, add_where
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import ANGLES, POINT_FORMATS, POINTS, TABLES, joined
+from geounfold.cli.arguments.texts import ANGLES, POINT_FORMATS, POINTS, TABLES, WHERE, joined
 
 _GRID = """\
 The blocks lie along the axes of the unfolded space; their faces are at whole
@@ -29,7 +29,7 @@ def add_grid(commands: Any) -> Parser:
         commands,
         "grid",
         "make a regular grid of blocks over unfolded points",
-        details=joined(_GRID, POINT_FORMATS),
+        details=joined(_GRID, WHERE, POINT_FORMATS),
         examples=(
             "geounfold grid flat.csv -o grid.csv --sizes 10,10,5",
             "geounfold grid flat.csv -o grid.csv --sizes 10,10,5 --map m.npz",
@@ -38,6 +38,8 @@ def add_grid(commands: Any) -> Parser:
     group = parser.section("grid")
     group.add("points", metavar="FLAT", help=f"unfolded points that the grid covers: {POINTS}")
     group.add("--columns", metavar="A,B,C", help="columns of the coordinates")
+    add_where(group, "where", "rows of FLAT to take, such as ROCK=ORE", rare=False)
+    add_element(group, "element", "FLAT")
     group.add("-o", "--output", metavar="GRID", required=True, help=f"the blocks: {TABLES}")
     group.add("--sizes", metavar="X,Y,Z", required=True, help="sides of a block")
     group.add("--map", metavar="M.npz", help="keep only blocks with a part in this map's body")
@@ -51,7 +53,7 @@ def add_transfer(commands: Any) -> Parser:
         commands,
         "transfer",
         "move values between folded and unfolded blocks",
-        details=joined(_TRANSFER, ANGLES, POINT_FORMATS),
+        details=joined(_TRANSFER, WHERE, ANGLES, POINT_FORMATS),
         examples=(
             "geounfold transfer m.npz grid.csv blocks.csv -o graded.csv --values au,cu",
             "geounfold transfer m.npz blocks.csv grid.csv -o flat.csv --values au \\\n"
@@ -79,6 +81,10 @@ def add_transfer(commands: Any) -> Parser:
             rare=True,
             help=f"columns of {side.upper()}'s coordinates",
         )
+    add_where(group, "where", "rows of TARGET that get values; others stay empty", rare=False)
+    add_where(group, "source-where", "rows of SOURCE to take, as --where", rare=False)
+    for side in ("source", "target"):
+        add_element(group, f"{side}-element", side.upper())
     group.add(
         "--drop-invalid", action="store_true", rare=True, help="leave out rows without coordinates"
     )

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_columns, add_command, add_method
+from geounfold.cli.arguments.groups import (
+    add_columns,
+    add_command,
+    add_element,
+    add_method,
+    add_where,
+)
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import FORMATS, POINT_FORMATS, POINTS, TABLES, joined
+from geounfold.cli.arguments.texts import FORMATS, POINT_FORMATS, POINTS, TABLES, WHERE, joined
 
 _COMPARE = """\
 Without --methods, a row is one flattener on the top, bottom or mid surface of
@@ -90,7 +96,7 @@ def add_compare(commands: Any) -> Parser:
         commands,
         "compare",
         "compare flatteners on one surface, or methods on one body",
-        details=joined(_COMPARE, FORMATS),
+        details=joined(_COMPARE, WHERE, FORMATS),
         examples=(
             "geounfold compare blocks.csv -o flatteners.csv",
             "geounfold compare blocks.csv -o methods.csv --methods sheet,ufo,shear",
@@ -115,7 +121,7 @@ def add_crosscheck(commands: Any) -> Parser:
         commands,
         "crosscheck",
         "compare a control mesh with other meshes of its border",
-        details=joined(_CROSSCHECK, POINT_FORMATS),
+        details=joined(_CROSSCHECK, WHERE, POINT_FORMATS),
         examples=(
             "geounfold crosscheck blocks.csv",
             "geounfold crosscheck blocks.csv -o meshes.csv --differences d.csv",
@@ -145,7 +151,7 @@ def add_quality(commands: Any) -> Parser:
         commands,
         "quality",
         "measure an unfolding: NMD, epsilon, distance ratios, RMS",
-        details=joined(_QUALITY, POINT_FORMATS),
+        details=joined(_QUALITY, WHERE, POINT_FORMATS),
         examples=(
             "geounfold quality blocks.csv flat.csv",
             "geounfold quality blocks.csv flat.csv --truth blocks.csv -o figures.json",
@@ -156,6 +162,9 @@ def add_quality(commands: Any) -> Parser:
     group.add("unfolded", metavar="UNFOLDED", help="the same points, unfolded")
     group.add("--truth", metavar="W", help="the same points before folding")
     group.add("--columns", metavar="A,B,C", help="columns of FOLDED's coordinates")
+    add_where(group, "where", "rows of FOLDED to take, and those of the other files", rare=False)
+    for name, whose in (("element", "FOLDED"), ("unfolded-element", "UNFOLDED")):
+        add_element(group, name, whose)
     group.add("--unfolded-columns", metavar="A,B,C", help="columns of UNFOLDED's coordinates")
     group.add("--truth-columns", metavar="A,B,C", help="columns of W's coordinates")
     group = parser.section("figures")

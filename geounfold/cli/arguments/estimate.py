@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_columns, add_command
+from geounfold.cli.arguments.groups import add_columns, add_command, add_samples_choice
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, joined
+from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, WHERE, joined
 
 _RESULTS = """\
 results, for a grade CU:
@@ -38,7 +38,7 @@ def add_estimate(commands: Any) -> Parser:
         commands,
         "estimate",
         "estimate a grade on blocks from samples, in the unfolded space",
-        details=joined(_RESULTS, POINT_FORMATS),
+        details=joined(_RESULTS, WHERE, POINT_FORMATS),
         examples=_EXAMPLES,
     )
     group = parser.section("inputs")
@@ -47,9 +47,7 @@ def add_estimate(commands: Any) -> Parser:
     group.add("points", metavar="BLOCKS", help=f"block centroids: {POINTS}")
     group.add("--grade", metavar="NAME", required=True, help="column of SAMPLES to estimate")
     group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
-    group.add(
-        "--samples-columns", metavar="A,B,C", rare=True, help="columns of SAMPLES' coordinates"
-    )
+    add_samples_choice(group)
     add_columns(group)
     group = parser.section("outputs")
     group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")

@@ -27,19 +27,48 @@ def add_common(parser: Parser) -> None:
 
 
 def add_columns(section: Section) -> None:
-    """Add the options for the columns of coordinates and for rows without them."""
+    """Add the options for the columns of coordinates and for the choice of rows."""
     section.add(
         "--columns",
         metavar="A,B,C",
         help="columns of the coordinates, if not x/y/z, XC/YC/ZC, centroid_x/y/z, "
         "easting/northing/elevation or alike",
     )
+    add_where(section, "where", "rows to take, such as ROCK=ORE; others stay empty", rare=False)
+    add_element(section, "element", "POINTS")
     section.add(
         "--drop-invalid",
         action="store_true",
         rare=True,
         help="leave out rows whose coordinates are missing or infinite; the summary counts them",
     )
+
+
+def add_where(section: Section, name: str, help_text: str, *, rare: bool = True) -> None:
+    """Add an option that chooses rows by an expression."""
+    section.add(f"--{name}", metavar="EXPR", rare=rare, help=help_text)
+
+
+def add_element(section: Section, name: str, whose: str) -> None:
+    """Add an option that chooses one element of a file of several."""
+    section.add(
+        f"--{name}",
+        metavar="NAME",
+        rare=True,
+        help=f"point set, block model or surface to read, if {whose} has several (OMF, geoh5)",
+    )
+
+
+def add_samples_choice(section: Section) -> None:
+    """Add the options that choose samples."""
+    section.add(
+        "--samples-columns",
+        metavar="A,B,C",
+        rare=True,
+        help="columns of the samples' coordinates, as --columns",
+    )
+    add_where(section, "samples-where", "samples to take, loose or assays; as --where")
+    add_element(section, "samples-element", "the file of samples")
 
 
 def add_frame(section: Section, whose: str, rotation: str = "") -> None:

@@ -6,7 +6,16 @@ from typing import Any
 
 from geounfold.cli.arguments.groups import add_columns, add_command, add_frame, add_holes
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import ANGLES, FORMATS, HOLES, KEPT_ROWS, POINTS, RESULTS, joined
+from geounfold.cli.arguments.texts import (
+    ANGLES,
+    FORMATS,
+    HOLES,
+    KEPT_ROWS,
+    POINTS,
+    RESULTS,
+    WHERE,
+    joined,
+)
 
 _INVERSE = """\
 with --inverse:
@@ -35,7 +44,7 @@ def add_map(commands: Any, *, holes: bool) -> Parser:
         "map",
         "carry samples, drill-holes or wireframes with a saved map",
         usage=_USAGE,
-        details=joined(RESULTS, _INVERSE, KEPT_ROWS, ANGLES, HOLES, FORMATS),
+        details=joined(RESULTS, _INVERSE, KEPT_ROWS, WHERE, ANGLES, HOLES, FORMATS),
         examples=_EXAMPLES,
     )
     group = parser.section("points")

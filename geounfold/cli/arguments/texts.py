@@ -35,6 +35,19 @@ KEPT_ROWS = """\
 OUT has every column and row of POINTS, in order. A result replaces a column of
 the same name in its place."""
 
+WHERE = """\
+choosing rows, with --where EXPR:
+  comparisons  COLUMN = VALUE, != (or <>), <, <=, >, >=
+               COLUMN in (A, B), COLUMN not in (A, B)
+               COLUMN is missing, COLUMN is not missing
+  joined by    and, or, not, brackets; and binds before or
+  Left of a sign stands a column, right of it a value: a number, a word, or
+  text in quotes. Names of columns with blanks are in quotes or backticks;
+  backticks right of a sign name a column too. Columns are found in any letter
+  case; text is compared exactly, numbers as numbers. A missing value equals
+  nothing; != is the opposite of =. Nothing is evaluated as code.
+  Rows that are not chosen have the location "not selected"."""
+
 ANGLES = """\
 turned block models:
   bearing is the compass direction of the model's own y axis (0: not turned),

@@ -6,7 +6,7 @@ from typing import Any
 
 from geounfold.cli.arguments.groups import add_columns, add_command
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS
+from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, WHERE, joined
 
 _SIMULATE = """\
 columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z
@@ -45,7 +45,7 @@ def add_view(commands: Any) -> Parser:
         commands,
         "view",
         "draw points or a saved map into a picture",
-        details=POINT_FORMATS,
+        details=joined(WHERE, POINT_FORMATS),
         examples=(
             "geounfold view flat.csv -o flat.png",
             "geounfold view flat.csv -o shear.png --colour shear",

@@ -11,9 +11,19 @@ from geounfold.cli.arguments.groups import (
     add_frame,
     add_holes,
     add_method,
+    add_samples_choice,
 )
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import ANGLES, FORMATS, HOLES, KEPT_ROWS, POINTS, RESULTS, joined
+from geounfold.cli.arguments.texts import (
+    ANGLES,
+    FORMATS,
+    HOLES,
+    KEPT_ROWS,
+    POINTS,
+    RESULTS,
+    WHERE,
+    joined,
+)
 
 _DISTORTION = """\
   volume_ratio, nmd_error, stretch_min, stretch_max, shear
@@ -39,7 +49,7 @@ def add_unfold(commands: Any) -> Parser:
         commands,
         "unfold",
         "take the folds out of an ore body",
-        details=joined(f"{RESULTS}\n{_DISTORTION}", KEPT_ROWS, ANGLES, HOLES, FORMATS),
+        details=joined(f"{RESULTS}\n{_DISTORTION}", KEPT_ROWS, WHERE, ANGLES, HOLES, FORMATS),
         examples=_EXAMPLES,
     )
     group = parser.section("body")
@@ -57,16 +67,12 @@ def add_unfold(commands: Any) -> Parser:
     group = parser.section("samples and drill-holes")
     group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")
     group.add("--samples-out", metavar="Q", help="the carried samples, loose or of drill-holes")
-    group.add(
-        "--samples-columns",
-        metavar="A,B,C",
-        rare=True,
-        help="columns of the samples' coordinates, as --columns",
-    )
+    add_samples_choice(group)
     add_holes(group)
     group.add(
         "--grade",
         metavar="NAME",
+        rare=True,
         help="column of samples or assays that the report explores",
     )
     group = parser.section("method")

@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
 from geounfold.cli.answers.table import table_text
-from geounfold.cli.inputs.points import TRUE, files_given, read, triple
+from geounfold.cli.inputs.points import TRUE, files_given, read_all, triple
 from geounfold.cli.inputs.unfold_options import MODEL_OPTIONS, config_file, listed, unfold_options
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
@@ -16,6 +16,7 @@ from geounfold.io.tables.files import write_table
 
 if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats, TriMesh
+    from geounfold.io import PointTable
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -31,15 +32,15 @@ def run(args: Namespace, console: Console) -> None:
         how["methods"] = listed(args.methods)
     elif args.truth is not None:
         raise OptionError("--truth needs --methods: it is compared with unfolded blocks")
-    if holds_surface(args.points):
-        given: TriMesh | Floats = read_surface(args.points)
+    if holds_surface(args.points, args.element):
+        given: TriMesh | Floats = read_surface(args.points, args.element)
         _refuse_model_options(args)
     else:
         how["unfolding"] = unfold_options(args)
-        table = read(args.points, args, console)
-        given = table.points
+        table = read_all(args.points, args, console)
+        given = table.only().points
         if args.truth is not None:
-            how["truth"] = _truth(args, len(table), console)
+            how["truth"] = _truth(args, table, console)
     from geounfold.comparison import flatteners
 
     every = "all" if args.methods is None else None
@@ -58,8 +59,9 @@ def run(args: Namespace, console: Console) -> None:
     console.answer({"rows": rows}, lambda: table_text(frame))
 
 
-def _truth(args: Namespace, count: int, console: Console) -> Floats:
-    """Return the blocks' coordinates before folding, (n, 3), row by row."""
+def _truth(args: Namespace, table: PointTable, console: Console) -> Floats:
+    """Return the blocks' coordinates before folding, (n, 3), those of the rows chosen."""
+    count = len(table)
     console.stage(f"reading {args.truth}")
     truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,))
     if len(truth) != count:
@@ -67,7 +69,7 @@ def _truth(args: Namespace, count: int, console: Console) -> Floats:
             f"{args.truth}: has {len(truth)} rows, but {args.points} has {count}; row i of both "
             "must be the same point"
         )
-    return truth.points
+    return truth.only(table.chosen).points
 
 
 def _refuse_model_options(args: Namespace) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
-from geounfold.cli.inputs.points import files_given, read
+from geounfold.cli.inputs.points import files_given, read_all
 from geounfold.cli.inputs.unfold_options import (
     command_line,
     config_file,
@@ -18,6 +18,7 @@ from geounfold.cli.terminal.console import Console
 from geounfold.io import Outputs, write_json
 from geounfold.io.paths import TABLE_ENDINGS, ending
 from geounfold.io.tables.files import write_table
+from geounfold.io.tables.parted import PartedTable
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -31,7 +32,7 @@ def run(args: Namespace, console: Console) -> None:
         overwrite=args.overwrite,
         watcher=console.journal,
     )
-    table = read(args.points, args, console)
+    table = PartedTable.chosen(read_all(args.points, args, console))
     if args.differences is not None:
         table.check_writable(args.differences)
     from geounfold.cli.answers.figures import crosscheck_lines

@@ -6,12 +6,13 @@ from argparse import Namespace
 from pathlib import Path
 
 from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
-from geounfold.cli.inputs.points import files_given, read, read_samples
+from geounfold.cli.inputs.points import files_given, read_all, read_samples
 from geounfold.cli.inputs.unfold_options import command_line
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import OptionError
 from geounfold.io import Outputs, write_json
 from geounfold.io.paths import existing_file
+from geounfold.io.tables.parted import PartedTable
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -25,7 +26,7 @@ def run(args: Namespace, console: Console) -> None:
         watcher=console.journal,
     )
     existing_file(Path(args.map))
-    table = read(args.points, args, console)
+    table = PartedTable.chosen(read_all(args.points, args, console))
     table.check_writable(args.output)
     samples = read_samples(args, console)
     if samples is None:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold.cli.inputs.numbers import three_numbers
-from geounfold.cli.inputs.points import files_given, read_table
+from geounfold.cli.inputs.points import files_given, read_table, where_of
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError
 from geounfold.io import Outputs
@@ -35,7 +35,10 @@ def run(args: Namespace, console: Console) -> None:
     if args.map is not None:
         existing_file(Path(args.map))
     # Rows without coordinates have no image; they are left out.
-    table = read_table(args.points, args.columns, console, (UNFOLDED,), drop_invalid=True)
+    table = read_table(
+        args.points, args.columns, console, (UNFOLDED,),
+        drop_invalid=True, where=where_of(args), element=args.element,
+    ).only()  # fmt: skip
     from geounfold.body.block_model import regular_grid
 
     console.stage("making the grid")

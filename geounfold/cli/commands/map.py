@@ -20,6 +20,7 @@ from geounfold.io import Outputs, holds_surface, write_surface
 from geounfold.io.paths import ending, existing_file
 from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, world_columns
 from geounfold.io.surfaces import read_surface_with_meta
+from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,6 +67,8 @@ def _check_options(args: Namespace) -> None:
         raise OptionError("--samples-out needs --holes COLLAR SURVEY ASSAY")
     if args.engine == "dask" and (args.points is None or args.holes is not None):
         raise OptionError("--engine dask carries POINTS into -o OUT, no drill-holes")
+    if args.engine == "dask" and args.where is not None:
+        raise OptionError("--engine dask carries all rows: go without --where")
     if args.engine != "dask" and args.scheduler is not None:
         raise OptionError("--scheduler needs --engine dask")
     if args.holes is not None and args.inverse:
@@ -79,8 +82,9 @@ def _carry_points(
     table = None
     if args.points is not None:
         prefer = (UNFOLDED,) if args.inverse else ()
-        table = open_table(args, console, prefer, frame=frame, keep=False)
-    holes = read_holes(args, console)
+        opened = open_table(args, console, prefer, frame=frame, keep=False)
+        table = PartedTable.chosen(opened)
+    holes = read_holes(args, console, where="where" if args.points is None else "")
     from geounfold.mapping import mesh_map
 
     saved = mesh_map.load(args.map)
@@ -172,7 +176,7 @@ def _is_wireframe(args: Namespace) -> bool:
     kind = ending(Path(args.output))
     if kind not in SURFACES_OUT:
         return False
-    return kind not in POINTS_OUT or holds_surface(args.points)
+    return kind not in POINTS_OUT or holds_surface(args.points, args.element)
 
 
 def _carry_surface(
@@ -180,7 +184,9 @@ def _carry_surface(
 ) -> None:
     """Carry a wireframe's vertices and write the same triangles between them."""
     console.stage(f"reading {args.points}")
-    mesh, meta = read_surface_with_meta(args.points)
+    if args.where is not None:
+        raise OptionError(f"--where chooses rows of a table; {args.points} is a surface")
+    mesh, meta = read_surface_with_meta(args.points, args.element)
     from geounfold.mapping import mesh_map
 
     saved = mesh_map.load(args.map)

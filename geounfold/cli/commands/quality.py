@@ -7,7 +7,7 @@ from typing import Any
 
 from geounfold.cli.answers.file_endings import JSON
 from geounfold.cli.inputs.numbers import whole_number
-from geounfold.cli.inputs.points import TRUE, files_given, triple
+from geounfold.cli.inputs.points import TRUE, files_given, triple, where_of
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError
 from geounfold.io import Outputs, read_points, write_json
@@ -22,11 +22,18 @@ def run(args: Namespace, console: Console) -> None:
         overwrite=args.overwrite,
         watcher=console.journal,
     )
-    folded = read_points(args.folded, triple(args.columns))
-    unfolded = read_points(args.unfolded, triple(args.unfolded_columns), prefer=(UNFOLDED,))
+    folded = read_points(
+        args.folded, triple(args.columns), where=where_of(args), element=args.element
+    )
+    rows = folded.chosen
+    unfolded = read_points(
+        args.unfolded, triple(args.unfolded_columns),
+        prefer=(UNFOLDED,), among=rows, element=args.unfolded_element,
+    )  # fmt: skip
     truth = None
     if args.truth is not None:
-        truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,))
+        truth = read_points(args.truth, triple(args.truth_columns), prefer=(TRUE,), among=rows)
+    folded = folded.only()
     for other in (unfolded, truth):
         if other is not None and len(other) != len(folded):
             raise InputError(

@@ -13,13 +13,14 @@ from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
 from geounfold.cli.inputs.block_sizes import columns_or_lengths
 from geounfold.cli.inputs.model_frame import model_axes, model_frame
 from geounfold.cli.inputs.numbers import whole_number
-from geounfold.cli.inputs.points import read_table
+from geounfold.cli.inputs.points import read_table, where_of
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, write_json
 from geounfold.io.coordinate_columns import Triple
 from geounfold.io.paths import existing_file
 from geounfold.io.result_columns import UNFOLDED, world_columns
+from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
     from geounfold.body.block_model import BlockModel
@@ -47,8 +48,14 @@ def run(args: Namespace, console: Console) -> None:
     read = partial(read_table, console=console, drop_invalid=args.drop_invalid)
     flat: dict[str, tuple[Triple, ...]] = {"prefer": (UNFOLDED,)}
     folded = {"place": place}
-    source = read(args.source, args.source_columns, **(flat if back else folded))
-    target = read(args.target, args.target_columns, **(folded if back else flat))
+    source = read(
+        args.source, args.source_columns, **(flat if back else folded),
+        where=where_of(args, "source_where"), element=args.source_element,
+    ).only()  # fmt: skip
+    target = PartedTable.chosen(read(
+        args.target, args.target_columns, **(folded if back else flat),
+        where=where_of(args), element=args.target_element,
+    ))  # fmt: skip
     names = _value_columns(args.values, source)
     target.check_writable(args.output)
     values = np.column_stack([source.numbers(name) for name in names])
@@ -113,7 +120,7 @@ def _value_columns(text: str, source: PointTable) -> list[str]:
     return names
 
 
-def _blocks(table: PointTable, sizes: str | None, axes: Floats | None) -> BlockModel:
+def _blocks(table: PointTable | PartedTable, sizes: str | None, axes: Floats | None) -> BlockModel:
     """Return a table's blocks; `sizes` are three columns or three lengths."""
     from geounfold.io.block_sizes import block_model
 

@@ -16,6 +16,7 @@ from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable
 from geounfold.io.paths import ending, existing_file
 from geounfold.io.result_columns import UNFOLDED
+from geounfold.io.tables.parted import ELSEWHERE, NOT_SELECTED
 
 if TYPE_CHECKING:
     from geounfold.geometry.mesh import Bools
@@ -98,10 +99,11 @@ def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:
 
 
 def _with_image(table: PointTable) -> Bools:
-    """Return which rows have an image: their location is not outside the map's reach, (n,)."""
+    """Return which rows have an image, by their location, (n,)."""
     if "location" not in table.frame.columns:
         return np.ones(len(table), dtype=bool)
-    return np.asarray(table.frame["location"].astype(str) != "outside", dtype=bool)
+    empty = ("outside", NOT_SELECTED, ELSEWHERE)
+    return ~np.asarray(table.frame["location"].astype(str).isin(empty), dtype=bool)
 
 
 def _default_colour(table: PointTable) -> str:

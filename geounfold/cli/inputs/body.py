@@ -13,6 +13,7 @@ from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import open_table, read_samples
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_surface
+from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,8 +29,8 @@ class BodyInputs:
 
     Attributes
     ----------
-    table : PointTable or PointStream
-        The blocks; a PointTable if there is a report.
+    table : PointTable, PointStream or PartedTable
+        The blocks; read whole if there is a report. With a choice of rows, a PartedTable.
     frame : ModelFrame or None
         That of the blocks; None if they are in the world.
     volumes : BlockVolumes
@@ -44,7 +45,7 @@ class BodyInputs:
         Given surfaces.
     """
 
-    table: PointTable | PointStream
+    table: PointTable | PointStream | PartedTable
     frame: ModelFrame | None
     volumes: BlockVolumes
     samples: PointTable | None
@@ -67,12 +68,11 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
     frame = model_frame(args)
     table = open_table(args, console, frame=frame, whole=args.report is not None)
     table.check_writable(args.output)
-    names = table.frame.columns if isinstance(table, PointTable) else table.rows.names
-    volumes = BlockVolumes(args.sizes, [str(name) for name in names], args.points)
+    volumes = BlockVolumes(args.sizes, table.names, args.points)
     samples = read_samples(args, console)
     holes = read_holes(args, console)
     return BodyInputs(
-        table,
+        PartedTable.chosen(table),
         frame,
         volumes,
         samples,

@@ -99,8 +99,18 @@ def check_hole_options(args: Namespace) -> None:
         raise OptionError("--holes needs --samples-out or --traces-out, or both")
 
 
-def read_holes(args: Namespace, console: Console) -> HoleData | None:
-    """Return the drill-holes of a command, and warn of rows that cannot be used."""
+def read_holes(args: Namespace, console: Console, where: str = "samples_where") -> HoleData | None:
+    """Return the drill-holes of a command, and warn of rows that cannot be used.
+
+    Parameters
+    ----------
+    args : Namespace
+        The options.
+    console : Console
+        Shows the stage and the warnings.
+    where : str, optional
+        Name of the option that chooses assays; empty for none.
+    """
     if args.holes is None:
         return None
     length = _length(args.composite)
@@ -114,6 +124,7 @@ def read_holes(args: Namespace, console: Console) -> HoleData | None:
         dip_positive_down=args.dip_positive_down,
         strict=args.strict,
         drop_invalid=args.drop_invalid,
+        where=getattr(args, where, None) if where else None,
     )
     for line in holes.messages():
         console.warn(line)

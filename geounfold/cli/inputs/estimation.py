@@ -17,12 +17,16 @@ from geounfold.io.paths import existing_file
 if TYPE_CHECKING:
     from geounfold.estimation import Estimation, Variogram
     from geounfold.io import PointTable
+    from geounfold.io.tables.parted import PartedTable
 
 _WHOLE = ("min_samples", "max_samples", "max_per_hole")
 
 
 def estimation(
-    args: Namespace, samples: PointTable, blocks: PointTable, stage: Callable[[str], None]
+    args: Namespace,
+    samples: PointTable,
+    blocks: PointTable | PartedTable,
+    stage: Callable[[str], None],
 ) -> Estimation:
     """Return the estimates on the blocks.
 

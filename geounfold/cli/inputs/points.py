@@ -10,6 +10,7 @@ from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_points
 from geounfold.io.coordinate_columns import Triple, parse_columns
 from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.selection import Where, read_where
 from geounfold.io.tables.points import Place
 
 if TYPE_CHECKING:
@@ -29,12 +30,26 @@ def triple(text: str | None) -> Triple | None:
     return None if text is None else parse_columns(text)
 
 
+def where_of(args: Namespace, name: str = "where") -> Where | None:
+    """Return the choice of rows that an option states; None without it."""
+    text = getattr(args, name, None)
+    return None if text is None else read_where(text)
+
+
 def read(path: str, args: Namespace, console: Console) -> PointTable:
-    """Read a command's points with its --columns and --drop-invalid."""
-    return read_table(path, args.columns, console, drop_invalid=args.drop_invalid)
+    """Read a command's points as `read_all`; rows that are not chosen are left out."""
+    return read_all(path, args, console).only()
 
 
-def read_table(
+def read_all(path: str, args: Namespace, console: Console) -> PointTable:
+    """Read a command's points with its --columns, --where, --element and --drop-invalid."""
+    return read_table(
+        path, args.columns, console,
+        drop_invalid=args.drop_invalid, where=where_of(args), element=args.element,
+    )  # fmt: skip
+
+
+def read_table(  # 8 parameters and a path: the choices of columns, rows and element
     path: str,
     columns: str | None,
     console: Console,
@@ -42,6 +57,8 @@ def read_table(
     place: Place | None = None,
     *,
     drop_invalid: bool,
+    where: Where | None = None,
+    element: str | None = None,
 ) -> PointTable:
     """Read points, and warn of rows that are left out.
 
@@ -59,10 +76,16 @@ def read_table(
         From the file's coordinates, (n, 3), to the world's.
     drop_invalid : bool
         Leave out rows without finite coordinates; else such a row is an InputError.
+    where : Where, optional
+        Chooses rows; the others stay in the table, marked (`PointTable.chosen`).
+    element : str, optional
+        Name of the element to read, for a file of several.
     """
     console.stage(f"reading {path}")
-    names = triple(columns)
-    table = read_points(path, names, prefer=prefer, drop_invalid=drop_invalid, place=place)
+    table = read_points(
+        path, triple(columns),
+        prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,
+    )  # fmt: skip
     _warn_of_dropped(table, path, console)
     return table
 
@@ -96,8 +119,9 @@ def open_table(
     place = None if frame is None else frame.to_world
     if whole or ending(Path(args.output)) not in TABLE_ENDINGS:
         return read_table(
-            args.points, args.columns, console, prefer, place, drop_invalid=args.drop_invalid
-        )
+            args.points, args.columns, console, prefer, place,
+            drop_invalid=args.drop_invalid, where=where_of(args), element=args.element,
+        )  # fmt: skip
     from geounfold.io.tables.large import open_points
 
     console.stage(f"reading {args.points}")
@@ -108,6 +132,8 @@ def open_table(
         drop_invalid=args.drop_invalid,
         place=place,
         keep=keep,
+        where=where_of(args),
+        element=args.element,
     )
     _warn_of_dropped(table, args.points, console)
     return table
@@ -117,8 +143,11 @@ def read_samples(args: Namespace, console: Console) -> PointTable | None:
     """Read the samples of a command; None if it has none."""
     if args.samples is None:
         return None
-    columns, drop_invalid = args.samples_columns, args.drop_invalid
-    return read_table(args.samples, columns, console, drop_invalid=drop_invalid)
+    return read_table(
+        args.samples, args.samples_columns, console,
+        drop_invalid=args.drop_invalid,
+        where=where_of(args, "samples_where"), element=args.samples_element,
+    ).only()  # fmt: skip
 
 
 def _warn_of_dropped(table: PointTable | PointStream, path: str, console: Console) -> None:

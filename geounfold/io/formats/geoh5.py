@@ -1,9 +1,10 @@
 """geoh5, the open format of Geoscience ANALYST, through geoh5py (extra ``formats``).
 
-One object of a workspace is read: a set of points; without one, a block model's cells with their
-sides (dx, dy, dz) and indices (i, j, k); or a surface. The object's coordinate reference and the
-workspace's unit are kept. A workspace must have a unit, so it is metres if the data have none, as
-in the library itself. Floats are read back bit for bit, whole numbers beyond 32 bits as floats.
+One object of a workspace is read: a set of points, a block model's cells with their sides (dx, dy,
+dz) and indices (i, j, k), or a surface. If several fit, the user names one. The object's coordinate
+reference and the workspace's unit are kept. A workspace must have a unit, so it is metres if the
+data have none, as in the library itself. Floats are read back bit for bit, whole numbers beyond 32
+bits as floats.
 
 On Python 3.11 geoh5py needs NumPy below 2, with which geounfold does not work. The extra therefore
 installs it from Python 3.12 on.
@@ -16,6 +17,8 @@ import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -24,36 +27,55 @@ import numpy as np
 
 from geounfold.errors import InputError, MissingDependencyError, OutputError
 from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.formats.elements import Element, Kind, chosen
 from geounfold.io.formats.grids import with_sides
 from geounfold.io.formats.point_tables import flattened
 from geounfold.io.formats.registry import Meta, Points, Surface, require
 from geounfold.io.formats.units import unit_name
-from geounfold.io.messages import listing
 
 _WORDS = {"m": "meter", "ft": "feet"}
 _LARGEST = 2**31 - 1
 _OWN = {"Visual Parameters", "A3D Node Data", "UserComments"}
 
 
-def read_points(path: Path) -> Points:
-    """Return the one set of points of a workspace, or the one block model's cells.
+def read_points(path: Path, element: str | None = None) -> Points:
+    """Return the set of points of a workspace, or the cells of its block model.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    element : str, optional
+        Name of the object, if there are several.
 
     Raises
     ------
     InputError
-        The file is no geoh5 file, or has no such object or several.
+        The file is no geoh5 file; it has no such object, or several and none is named.
     """
     with _workspace(path) as (workspace, objects):
-        points = _one(path, workspace, objects.Points)
-        if points is not None:
-            xyz = np.asarray(points.vertices, dtype=np.float64)
-            return Points(xyz, _values(points, "VERTEX", len(xyz)), _meta(workspace, points))
-        model = _one(path, workspace, objects.BlockModel)
-        if model is None:
-            raise InputError(f"{path}: holds neither points nor a block model")
-        xyz = np.asarray(model.centroids, dtype=np.float64)
-        values = with_sides(_values(model, "CELL", len(xyz)), *_cells(model))
-        return Points(xyz, values, _meta(workspace, model))
+        found = chosen(path, _elements(workspace, objects), (Kind.POINTS, Kind.BLOCKS), element)
+        points: Points = found.load()
+        return replace(points, element=found.name)
+
+
+def _points(workspace: Any, found: Any) -> Points:
+    xyz = np.asarray(found.vertices, dtype=np.float64)
+    return Points(xyz, _values(found, "VERTEX", len(xyz)), _meta(workspace, found))
+
+
+def _blocks(workspace: Any, model: Any) -> Points:
+    xyz = np.asarray(model.centroids, dtype=np.float64)
+    values = with_sides(_values(model, "CELL", len(xyz)), *_cells(model))
+    return Points(xyz, values, _meta(workspace, model))
+
+
+def _surface(workspace: Any, surface: Any) -> Surface:
+    return Surface(
+        np.asarray(surface.vertices, dtype=np.float64),
+        np.asarray(surface.cells, dtype=np.int64),
+        _meta(workspace, surface),
+    )
 
 
 def write_points(path: Path, points: Points) -> None:
@@ -75,17 +97,12 @@ def write_points(path: Path, points: Points) -> None:
             made.add_data(data)
 
 
-def read_surface(path: Path) -> Surface:
-    """Return the one surface of a workspace."""
+def read_surface(path: Path, element: str | None = None) -> Surface:
+    """Return the surface of a workspace, or that of a name."""
     with _workspace(path) as (workspace, objects):
-        surface = _one(path, workspace, objects.Surface)
-        if surface is None:
-            raise InputError(f"{path}: holds no surface")
-        return Surface(
-            np.asarray(surface.vertices, dtype=np.float64),
-            np.asarray(surface.cells, dtype=np.int64),
-            _meta(workspace, surface),
-        )
+        found = chosen(path, _elements(workspace, objects), (Kind.SURFACE,), element)
+        surface: Surface = found.load()
+        return surface
 
 
 def write_surface(path: Path, surface: Surface) -> None:
@@ -138,15 +155,24 @@ def _created(path: Path, meta: Meta) -> Iterator[tuple[Any, Any]]:
         raise OSError(code, os.strerror(code), str(path)) from error
 
 
-def _one(path: Path, workspace: Any, kind: Any) -> Any:
-    """Return the only object of exactly this kind; None if there is none."""
-    found = [o for o in workspace.objects if type(o) is kind]
-    if len(found) > 1:
-        raise InputError(
-            f"{path}: holds several objects of one kind ({listing(o.name for o in found)}); "
-            "export a single one"
-        )
-    return found[0] if found else None
+def elements_of(path: Path) -> list[Element]:
+    """Return the objects of a workspace, by name and kind."""
+    with _workspace(path) as (workspace, objects):
+        return _elements(workspace, objects)
+
+
+def _elements(workspace: Any, objects: Any) -> list[Element]:
+    """Return the objects of a workspace, in its order."""
+    readers = {
+        objects.Points: (Kind.POINTS, _points),
+        objects.BlockModel: (Kind.BLOCKS, _blocks),
+        objects.Surface: (Kind.SURFACE, _surface),
+    }
+    found = []
+    for made in workspace.objects:
+        kind, load = readers.get(type(made), (Kind.OTHER, _surface))
+        found.append(Element(str(made.name), kind, partial(load, workspace, made)))
+    return found
 
 
 def _values(parent: Any, location: str, rows: int) -> dict[str, np.ndarray]:

@@ -28,11 +28,14 @@ class Points:
         Values by name: float64 (missing: NaN), int64, or text as objects (missing: empty).
     meta : dict of str
         Unit and coordinate reference, if known.
+    element : str
+        Name of the element that was read, if the file may hold several.
     """
 
     xyz: Floats
     data: Mapping[str, np.ndarray]
     meta: Meta = field(default_factory=dict)
+    element: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,8 @@ class Format:
         Whether text columns are written as codes (see `coded`).
     library : str
         Optional library that the module needs, at least for writing; empty for none.
+    elements : bool
+        Whether a file may hold several elements, of which one is read by its name.
     """
 
     name: str
@@ -80,6 +85,7 @@ class Format:
     writes_surface: tuple[str, ...] = ()
     numbers_only: bool = False
     library: str = ""
+    elements: bool = False
 
     def check_library(self) -> None:
         """Raise MissingDependencyError if the format's library is not installed."""
@@ -98,8 +104,17 @@ FORMATS = (
     Format("GSLIB (GeoEAS)", "gslib", _GSLIB, _GSLIB, numbers_only=True),
     Format("VTK", "vtk", (".vtu", ".vtp", ".vti"), (".vtu", ".vtp"), (".vtp",), (".vtp",)),
     Format("GOCAD", "gocad", (".vs", ".ts"), (".vs",), (".ts",), (".ts",), numbers_only=True),
-    Format("OMF", "omf", (".omf",), (".omf",), (".omf",), (".omf",), library="omf"),
-    Format("geoh5", "geoh5", (".geoh5",), (".geoh5",), (".geoh5",), (".geoh5",), library="geoh5py"),
+    Format("OMF", "omf", (".omf",), (".omf",), (".omf",), (".omf",), library="omf", elements=True),
+    Format(
+        "geoh5",
+        "geoh5",
+        (".geoh5",),
+        (".geoh5",),
+        (".geoh5",),
+        (".geoh5",),
+        library="geoh5py",
+        elements=True,
+    ),
     Format("DXF", "dxf", (), (), (".dxf",), (".dxf",), library="ezdxf"),
     Format("mesh", "meshes", (), (), _MESHES, _MESHES),
 )

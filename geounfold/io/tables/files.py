@@ -22,7 +22,7 @@ import pandas as pd
 
 from geounfold.errors import InputError, OutputError
 from geounfold.io.column_values import TextKind, typed_values
-from geounfold.io.messages import shown
+from geounfold.io.messages import no_elements, shown
 from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file
 from geounfold.io.tables.csv_text import csv_header, csv_reader, csv_text, text_content
 from geounfold.io.tables.parquet import ParquetParts, pyarrow_module
@@ -46,15 +46,18 @@ class Table:
     meta : dict of str
         Unit (``unit``) and coordinate reference (``crs``) of the coordinates, if the file holds
         them.
+    element : str
+        Name of the element that was read, if the file may hold several.
     """
 
     frame: pd.DataFrame
     text: bool
     columns: tuple[str, str, str] | None = None
     meta: Mapping[str, str] = field(default_factory=dict)
+    element: str = ""
 
 
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path, element: str | None = None) -> Table:
     """Return the table in a file.
 
     A CSV is in UTF-8, with or without a byte-order mark. Its first row names the columns. Commas,
@@ -65,11 +68,14 @@ def read_table(path: str | Path) -> Table:
     path : path
         A file ending in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`. Points
         of those formats become columns x, y, z.
+    element : str, optional
+        Name of the element to read, for a file of several (OMF, geoh5).
 
     Raises
     ------
     InputError
-        The file is missing, empty, a directory, not a table, damaged, or holds no rows.
+        The file is missing, empty, a directory, not a table, damaged, or holds no rows; it holds
+        several elements and none is named, or none of that name.
     MissingDependencyError
         The format's library is not installed.
     """
@@ -77,15 +83,17 @@ def read_table(path: str | Path) -> Table:
     kind = ending(path)
     existing_file(path)
     if kind in TABLE_ENDINGS:
+        if element is not None:
+            raise no_elements(path)
         table = _read_parquet(path) if kind == ".parquet" else _read_csv(path)
     else:
-        table = _read_format(path, kind)
+        table = _read_format(path, kind, element)
     if not len(table.frame):
         raise InputError(f"{path}: the table has a header but no rows")
     return table
 
 
-def _read_format(path: Path, kind: str) -> Table:
+def _read_format(path: Path, kind: str, element: str | None) -> Table:
     """Return the points of a file of another format as a table."""
     from geounfold.io.formats import find_format, point_endings, point_tables
 
@@ -94,10 +102,12 @@ def _read_format(path: Path, kind: str) -> Table:
         endings = ", ".join((*TABLE_ENDINGS, *point_endings()))
         raise InputError(f"{path}: unknown kind of table '{kind}'; files end in {endings}")
     module = found.load()
+    if element is not None and not found.elements:
+        raise no_elements(path)
     if hasattr(module, "read_frame"):
         return Table(module.read_frame(path), text=False)
-    points = module.read_points(path)
-    return Table(point_tables.to_frame(points), False, ("x", "y", "z"), points.meta)
+    points = module.read_points(path, element) if found.elements else module.read_points(path)
+    return Table(point_tables.to_frame(points), False, ("x", "y", "z"), points.meta, points.element)
 
 
 @contextmanager

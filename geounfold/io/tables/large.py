@@ -12,7 +12,7 @@ import gzip
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, Protocol, cast
@@ -27,10 +27,12 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.column_values import TextKind
 from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
 from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.selection import Where, column_position
+from geounfold.io.selection.labels import codes_of
 from geounfold.io.tables.csv_text import csv_header, csv_reader, most_unpacked
 from geounfold.io.tables.files import table_writer, with_columns
 from geounfold.io.tables.parquet import pyarrow_module
-from geounfold.io.tables.points import Place, PointTable, read_points
+from geounfold.io.tables.points import Place, PointTable, chosen_facts, read_points
 
 BATCH = 1 << 17
 """Number of rows in a batch."""
@@ -154,6 +156,10 @@ class PointStream:
         Returns world coordinates of the file's (see Place); None if the file holds the world's.
     meta : dict of str
         Empty, because CSV and Parquet hold neither unit nor coordinate reference.
+    chosen : (n,) bool or None
+        Rows that the user chose; None if all are.
+    where : str
+        The expression that chose them.
     """
 
     source: str
@@ -164,6 +170,8 @@ class PointStream:
     dropped: Ints
     place: Place | None = None
     meta: Mapping[str, str] = field(default_factory=dict)
+    chosen: Bools | None = None
+    where: str = ""
 
     def __len__(self) -> int:
         return self.count
@@ -175,10 +183,24 @@ class PointStream:
             raise ValueError("the coordinates were not kept")
         return self.kept
 
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns."""
+        return self.rows.names
+
     @cached_property
     def duplicates(self) -> int:
         """Number of points with the coordinates of an earlier one; they are kept."""
-        return count_duplicates(self.points)
+        points = self.points if self.chosen is None else self.points[self.chosen]
+        return count_duplicates(points)
+
+    def categories(self, column: str) -> tuple[Ints, list[str]]:
+        """Return a column's values as `labels.codes_of` does."""
+        where = column_position(self.rows.names, column, self.source)
+        codes, names = codes_of(f.iloc[:, 0] for f in self.rows.batches((where,)))
+        there = np.ones(len(codes), dtype=bool)
+        there[self.dropped - 1] = False
+        return codes[there], names
 
     def check_writable(self, path: str | Path) -> None:
         """Do nothing, because CSV and Parquet can hold each other's columns."""
@@ -192,6 +214,7 @@ class PointStream:
             "dropped_invalid": len(self.dropped),
             "dropped_rows": self.dropped[:100].tolist(),
             "duplicates": self.duplicates,
+            **chosen_facts(self.chosen, self.where),
         }
 
     def write_parts(self, path: str | Path, make: Make) -> None:
@@ -241,7 +264,9 @@ class PointStream:
             start = rows.stop
             if not len(frame):
                 continue
-            if self.kept is not None and not np.array_equal(points, self.kept[rows]):
+            if self.kept is not None and not np.array_equal(
+                points, self.kept[rows], equal_nan=True
+            ):
                 break
             yield frame, points, rows
         if start != self.count:
@@ -272,22 +297,27 @@ def open_points(
     drop_invalid: bool = False,
     place: Place | None = None,
     keep: bool = True,
+    where: Where | None = None,
+    element: str | None = None,
 ) -> PointTable | PointStream:
     """Return the points of a file, in batches if it is a large table.
 
     Parameters
     ----------
-    path, columns, prefer, drop_invalid, place
+    path, columns, prefer, drop_invalid, place, where, element
         As `read_points` takes them; the errors are the same too.
     keep : bool
         Whether the coordinates of a large file are kept in memory.
     """
-    source = _large(Path(path))
+    source = None if element is not None else _large(Path(path))
     if source is not None:
-        found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep)
+        found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep, where)
         if found is not None:
             return found
-    return read_points(path, columns, prefer=prefer, drop_invalid=drop_invalid, place=place)
+    return read_points(
+        path, columns,
+        prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,
+    )  # fmt: skip
 
 
 def _large(path: Path) -> Source | None:
@@ -305,7 +335,7 @@ def _large(path: Path) -> Source | None:
         return None
 
 
-def _opened(
+def _opened(  # 8 arguments: those of open_points, checked
     path: str,
     source: Source,
     columns: Triple | None,
@@ -313,6 +343,7 @@ def _opened(
     drop_invalid: bool,
     place: Place | None,
     keep: bool,
+    where: Where | None,
 ) -> PointStream | None:
     """Return the points of a source; None if something is wrong, for which `read_points` raises."""
     if len(set(source.names)) < len(source.names):
@@ -321,25 +352,33 @@ def _opened(
         columns = next((p for p in prefer if set(p) <= set(source.names)), None)
     kept: list[Floats] = []
     dropped = [np.empty(0, np.int64)]
+    chosen = [np.empty(0, bool)]
     row = 0
     try:
-        where = coordinate_columns(source.names, columns, source=path, own=place is not None)
-        for frame in source.batches(where):
+        axes = coordinate_columns(source.names, columns, source=path, own=place is not None)
+        more = [] if where is None else where.positions(source.names, path)
+        for frame in source.batches((*axes, *(k for k in more if k not in axes))):
             points = _coordinates(frame, (0, 1, 2), path, place)
+            mask = np.ones(len(frame), bool) if where is None else where.mask(frame, path)
             valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
-            if (np.abs(points[valid]) > LARGEST_COORDINATE).any():
+            if (np.abs(points[valid & mask]) > LARGEST_COORDINATE).any():
                 return None
-            if not valid.all():
-                dropped.append(np.flatnonzero(~valid) + 1 + row)
-                points = points[valid]
+            there = valid | ~mask
+            if not there.all():
+                dropped.append(np.flatnonzero(~there) + 1 + row)
+                points = points[there]
+            chosen.append(mask[there])
             row += len(frame)
             if keep:
                 kept.append(points)
     except _FAULTS:  # read_points then raises the error
         return None
     left_out = np.concatenate(dropped)
-    if (len(left_out) and not drop_invalid) or len(left_out) == row:
+    every = np.concatenate(chosen)
+    if (len(left_out) and not drop_invalid) or not every.any():
         return None
-    a, b, c = (source.names[i] for i in where)
+    a, b, c = (source.names[i] for i in axes)
     whole = np.concatenate(kept) if keep else None
-    return PointStream(path, source, (a, b, c), whole, row - len(left_out), left_out, place)
+    count = row - len(left_out)
+    found = PointStream(path, source, (a, b, c), whole, count, left_out, place)
+    return found if where is None else replace(found, chosen=every, where=where.text)

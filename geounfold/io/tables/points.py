@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
 from geounfold.io.messages import counted, listing, rows_named, shown
+from geounfold.io.selection import Where, column_position, not_chosen
+from geounfold.io.selection.labels import codes_of
 from geounfold.io.tables.files import check_writable, read_table, with_columns, write_table
 
 Place = Callable[[Floats], Floats]
@@ -35,13 +37,19 @@ class PointTable:
     columns : three str
         Names of the coordinate columns.
     points : (n, 3) float
-        World coordinates, in the file's unit; finite.
+        World coordinates, in the file's unit; finite, but for rows that are not chosen.
     dropped : (k,) int
         Data rows left out because a coordinate is not finite; 1 is the first one.
     text : bool
         Whether the columns are text, because the file is a CSV.
     meta : dict of str
         Unit and coordinate reference, if the file holds them.
+    chosen : (n,) bool or None
+        Rows that the user chose; None if all are.
+    where : str
+        The expression that chose them.
+    element : str
+        Name of the element that was read, if the file may hold several.
     """
 
     source: str
@@ -51,14 +59,38 @@ class PointTable:
     dropped: Ints
     text: bool
     meta: Mapping[str, str] = field(default_factory=dict)
+    chosen: Bools | None = None
+    where: str = ""
+    element: str = ""
 
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns."""
+        return [str(name) for name in self.frame.columns]
+
     @cached_property
     def duplicates(self) -> int:
         """Number of points with the coordinates of an earlier one; they are kept."""
-        return int(pd.DataFrame(self.points).duplicated().sum())
+        points = self.points if self.chosen is None else self.points[self.chosen]
+        return int(pd.DataFrame(points).duplicated().sum())
+
+    def only(self, rows: Bools | Ints | None = None) -> PointTable:
+        """Return a table of some rows, or of those that the user chose."""
+        rows = self.chosen if rows is None else rows
+        if rows is None:
+            return self
+        frame = self.frame.iloc[np.flatnonzero(rows) if rows.dtype == bool else rows]
+        return replace(
+            self, frame=frame.reset_index(drop=True), points=self.points[rows], chosen=None
+        )
+
+    def categories(self, column: str) -> tuple[Ints, list[str]]:
+        """Return a column's values as `labels.codes_of` does."""
+        where = column_position(self.names, column, self.source)
+        return codes_of([self.frame.iloc[:, where]])
 
     def numbers(self, column: str) -> Floats:
         """Return a column's values, (n,) float; missing ones are NaN.
@@ -122,8 +154,17 @@ class PointTable:
             "dropped_invalid": len(self.dropped),
             "dropped_rows": self.dropped[:100].tolist(),
             "duplicates": self.duplicates,
+            **chosen_facts(self.chosen, self.where),
+            **({"element": self.element} if self.element else {}),
             **self.meta,
         }
+
+
+def chosen_facts(chosen: Bools | None, where: str) -> dict[str, Any]:
+    """Return the figures of a choice of rows, for a summary; none without a choice."""
+    if chosen is None:
+        return {}
+    return {"where": where, "selected": int(np.count_nonzero(chosen))}
 
 
 def read_points(
@@ -133,6 +174,9 @@ def read_points(
     prefer: tuple[Triple, ...] = (),
     drop_invalid: bool = False,
     place: Place | None = None,
+    where: Where | None = None,
+    among: Bools | None = None,
+    element: str | None = None,
 ) -> PointTable:
     """Return the points of a file: a table, or any format of `geounfold.io.formats`.
 
@@ -148,35 +192,64 @@ def read_points(
         True to leave out rows whose coordinates are missing or infinite; False to raise an error.
     place : callable, optional
         Returns world coordinates of a model's own, for a file in the latter (see Place).
+    where : Where, optional
+        Chooses rows. The others stay in the table; their coordinates may be missing.
+    among : (n,) bool, optional
+        The rows to read, of a file whose row i is the point of row i of another file.
+    element : str, optional
+        Name of the element to read, for a file of several.
 
     Raises
     ------
     InputError
-        The file cannot be read; columns are missing, ambiguous or not numeric; coordinates are
-        missing, infinite or too large; or no rows are left.
+        The file cannot be read; no row is chosen; columns are missing, ambiguous or not numeric;
+        coordinates are missing, infinite or too large; or no rows are left.
     """
     source = str(path)
-    table = read_table(path)
+    table = read_table(path, element)
+    if among is not None and len(among) == len(table.frame):
+        table = replace(table, frame=table.frame.loc[among].reset_index(drop=True))
     names = [str(name) for name in table.frame.columns]
     if columns is None:
         columns = next((p for p in prefer if set(p) <= set(names)), table.columns)
-    where = coordinate_columns(names, columns, source=source, own=place is not None)
-    axes = [numbers(table.frame.iloc[:, i], source=source) for i in where]
+    found = coordinate_columns(names, columns, source=source, own=place is not None)
+    chosen = None if where is None else chosen_rows(where, table.frame, source)
+    axes = [numbers(table.frame.iloc[:, i], source=source) for i in found]
     points = np.column_stack(axes)
     if place is not None:
         points = place(points)
     valid: Bools = np.asarray(np.isfinite(points).all(axis=1))
-    _check_size(points, valid, source)
-    dropped = np.flatnonzero(~valid) + 1
+    _check_size(points, valid if chosen is None else valid & chosen, source)
+    kept = valid if chosen is None else valid | ~chosen
+    dropped = np.flatnonzero(~kept) + 1
     if len(dropped) and not drop_invalid:
         raise _invalid(dropped, len(points), source)
-    if len(dropped) == len(points):
+    if not (kept if chosen is None else valid & chosen).any():
         raise InputError(f"{source}: no row has finite coordinates")
     frame = table.frame
     if len(dropped):
-        frame, points = frame.loc[valid].reset_index(drop=True), points[valid]
-    a, b, c = (names[i] for i in where)
-    return PointTable(source, frame, (a, b, c), points, dropped, table.text, table.meta)
+        frame, points = frame.loc[kept].reset_index(drop=True), points[kept]
+        chosen = None if chosen is None else chosen[kept]
+    a, b, c = (names[i] for i in found)
+    text = "" if where is None else where.text
+    return PointTable(
+        source, frame, (a, b, c), points, dropped, table.text, table.meta, chosen, text,
+        table.element,
+    )  # fmt: skip
+
+
+def chosen_rows(where: Where, frame: pd.DataFrame, source: str) -> Bools:
+    """Return the rows that an expression chooses, (n,).
+
+    Raises
+    ------
+    InputError
+        It chooses none, or its columns do not fit.
+    """
+    chosen = where.mask(frame, source)
+    if not chosen.any():
+        raise not_chosen(where, frame, source)
+    return chosen
 
 
 def _invalid(rows: Ints, total: int, source: str) -> InputError:

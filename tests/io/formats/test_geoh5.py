@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 
+from geounfold.errors import InputError
 from geounfold.io import read_points, read_surface
+from geounfold.io.formats import geoh5
 from tests.io.formats.samples import XYZ, needs, places, sides
 
 
@@ -61,3 +68,40 @@ def test_geoh5_block_models_bring_sides_and_places(tmp_path: Path) -> None:
     i, j, k = np.array(places(table)).T
     own = np.column_stack([100 - v[j], 200 + u[i], 50 + z[k]])
     np.testing.assert_allclose(table.points, own, rtol=1e-14)
+
+
+class _Points(SimpleNamespace):
+    coordinate_reference_system = None
+    children: tuple[Any, ...] = ()
+
+
+class _Surface(_Points):
+    pass
+
+
+def test_an_object_of_several_is_chosen_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Objects that stand in for the library's, which not every Python has."""
+    held = [
+        _Points(name="holes", vertices=np.zeros((2, 3))),
+        _Points(name="blocks", vertices=np.ones((3, 3))),
+        _Surface(name="top", vertices=np.eye(3), cells=[[0, 1, 2]]),
+    ]
+    kinds = SimpleNamespace(Points=_Points, Surface=_Surface, BlockModel=type("_B", (), {}))
+
+    @contextmanager
+    def workspace(_: Path) -> Iterator[tuple[Any, Any]]:
+        yield SimpleNamespace(objects=held, distance_unit="meter"), kinds
+
+    monkeypatch.setattr(geoh5, "_workspace", workspace)
+    path = tmp_path / "p.geoh5"
+    path.write_bytes(b"x")
+    with pytest.raises(InputError, match="point set 'holes', point set 'blocks'; choose one by"):
+        read_points(path)
+    found = read_points(path, element="blocks")
+    assert found.points.tolist() == [[1, 1, 1]] * 3
+    assert found.facts()["element"] == "blocks"
+    with pytest.raises(InputError, match=r"no point set or block model is called 'top'"):
+        read_points(path, element="top")
+    assert len(read_surface(path, "top").F) == 1

@@ -1,7 +1,8 @@
 """OMF, the Open Mining Format: read in all versions, written by its Python library.
 
-A file holds a project of elements, of which one is read: a point set; without one, a block model,
-whose centroids become points; or a surface. Three layouts have the same ending:
+A file holds a project of elements, of which one is read: a point set, a block model, whose
+centroids become points, or a surface. If several fit, the user names one. Three layouts have the
+same ending:
 
 - version 1 (`version1`): w runs fastest through a volume's cells;
 - version 2 (`version2`): a zip archive of Parquet tables; u runs fastest;
@@ -21,44 +22,51 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from geounfold.errors import InputError
+from geounfold.io.formats.elements import Element, Kind, chosen
 from geounfold.io.formats.omf import prerelease, version1, version2
-from geounfold.io.formats.omf.elements import Element, Kind
 from geounfold.io.formats.omf.writing import write_points, write_surface
 from geounfold.io.formats.registry import Points, Surface
-from geounfold.io.messages import listing
 
-__all__ = ["read_points", "read_surface", "write_points", "write_surface"]
+__all__ = ["elements_of", "read_points", "read_surface", "write_points", "write_surface"]
 
 
-def read_points(path: Path) -> Points:
-    """Return the one point set of a file; without one, the blocks of the one block model.
+def read_points(path: Path, element: str | None = None) -> Points:
+    """Return the point set of a file, or the blocks of its block model.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    element : str, optional
+        Name of the point set or block model, if there are several.
 
     Raises
     ------
     InputError
-        The file is no OMF file, is damaged, or has no such element or several.
+        The file is no OMF file or is damaged; it has no such element, or several and none is
+        named.
     """
     with _damage_reported(path):
-        elements = _elements(path)
-        for kind in (Kind.POINTS, Kind.BLOCKS):
-            found = _one(path, elements, kind)
-            if found is not None:
-                points: Points = found.load()
-                return points
-    raise InputError(f"{path}: holds neither a point set nor a block model")
+        found = chosen(path, _elements(path), (Kind.POINTS, Kind.BLOCKS), element)
+        points: Points = found.load()
+        return replace(points, element=found.name)
 
 
-def read_surface(path: Path) -> Surface:
-    """Return the one triangulated surface of a file."""
+def read_surface(path: Path, element: str | None = None) -> Surface:
+    """Return the triangulated surface of a file, or that of a name."""
     with _damage_reported(path):
-        found = _one(path, _elements(path), Kind.SURFACE)
-        if found is None:
-            raise InputError(f"{path}: holds no surface of triangles")
-        surface: Surface = found.load()
+        surface: Surface = chosen(path, _elements(path), (Kind.SURFACE,), element).load()
         return surface
+
+
+def elements_of(path: Path) -> list[Element]:
+    """Return the elements of a file, by name and kind."""
+    with _damage_reported(path):
+        return _elements(path)
 
 
 def _elements(path: Path) -> list[Element]:
@@ -79,17 +87,6 @@ def _elements(path: Path) -> list[Element]:
     if prerelease.INDEX in names:
         return prerelease.elements(path)
     raise InputError(f"{path}: is a zip archive, but no OMF file of version 2")
-
-
-def _one(path: Path, elements: list[Element], kind: Kind) -> Element | None:
-    """Return the only element of a kind; None if there is none."""
-    found = [element for element in elements if element.kind is kind]
-    if len(found) > 1:
-        raise InputError(
-            f"{path}: holds several elements of one kind ({listing(e.name for e in found)}); "
-            "export a single one"
-        )
-    return found[0] if found else None
 
 
 @contextmanager

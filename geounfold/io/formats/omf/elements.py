@@ -1,10 +1,8 @@
-"""Parts common to all versions of OMF: elements of a kind, and their values."""
+"""Parts common to all versions of OMF: the values of elements, their units and versions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,34 +15,6 @@ from geounfold.io.formats.grids import Blocks, with_sides
 from geounfold.io.formats.point_tables import flattened
 from geounfold.io.formats.registry import Meta, Points
 from geounfold.io.formats.units import unit_name
-
-
-class Kind(Enum):
-    """Kinds of elements."""
-
-    POINTS = "points"
-    BLOCKS = "blocks"
-    SURFACE = "surface"
-    OTHER = "other"
-
-
-@dataclass(frozen=True, eq=False)
-class Element:
-    """One element of a project, loaded on demand.
-
-    Attributes
-    ----------
-    name : str
-        Name in the file.
-    kind : Kind
-        The element's kind.
-    load : function
-        Function that returns the element's `Points` or `Surface`.
-    """
-
-    name: str
-    kind: Kind
-    load: Callable[[], Any]
 
 
 def values_by_name(found: Iterable[tuple[str, np.ndarray]], rows: int) -> dict[str, np.ndarray]:

@@ -21,10 +21,9 @@ from typing import Any
 import numpy as np
 
 from geounfold.geometry.mesh import Floats
+from geounfold.io.formats.elements import Element, Kind
 from geounfold.io.formats.grids import Blocks, Grid, places, regular_grid, tensor_grid
 from geounfold.io.formats.omf.elements import (
-    Element,
-    Kind,
     block_points,
     coordinate_meta,
     of_parents,

@@ -43,14 +43,17 @@ def elements_of(path: Path) -> dict[str, Any]:
 
 def test_version_2_one_of_everything() -> None:
     path = DATA / "one_of_everything.omf"
-    points = read_points(path)
+    with pytest.raises(InputError, match=r"5 elements.*'Pyramid points'.*choose one by --element"):
+        read_points(path)
+    points = read_points(path, element="pyramid points")
+    assert points.facts()["element"] == "Pyramid points"
     # A pyramid over (-1, -1) to (1, 1) with its tip at 1.
     assert points.points.tolist() == [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 1]]
     assert points.frame["Categories"].tolist() == ["Base"] * 4 + ["Top"]
     # Only the tip has a vector of three, and none of two.
     np.testing.assert_array_equal(points.numbers("3D Vectors_2"), [np.nan] * 4 + [1.0])
     np.testing.assert_array_equal(points.numbers("2D Vectors_1"), [0.0, 1.0, 1.0, 0.0, np.nan])
-    with pytest.raises(InputError, match=r"several elements.*Pyramid surface.*Cube faces"):
+    with pytest.raises(InputError, match=r"3 elements.*Pyramid surface.*Cube faces"):
         read_surface(path)
     found = elements_of(path)
     cube = found["Cube faces"].load()  # in a composite

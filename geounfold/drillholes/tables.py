@@ -14,8 +14,9 @@ from geounfold.errors import InputError, OptionError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.column_values import objects, unique_names
-from geounfold.io.coordinate_columns import plain_name, readable_numbers
+from geounfold.io.coordinate_columns import readable_numbers
 from geounfold.io.messages import listing, shown
+from geounfold.io.packages.names import plain_name
 from geounfold.io.selection import read_where
 from geounfold.io.tables.files import Table, read_table
 from geounfold.io.tables.points import chosen_rows

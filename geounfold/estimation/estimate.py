@@ -25,7 +25,8 @@ from geounfold.estimation.neighbourhood import Neighbourhood
 from geounfold.estimation.scores import Conservation, conservation
 from geounfold.estimation.variogram import Triple, Variogram
 from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.io.coordinate_columns import numbers, plain_name
+from geounfold.io.coordinate_columns import numbers
+from geounfold.io.packages.names import plain_name
 from geounfold.io.result_columns import frame_points
 from geounfold.mapping.carried import Carried, checked_points
 

@@ -12,14 +12,9 @@ from geounfold.body.block_model import BlockModel
 from geounfold.body.lattice import measure_lattice
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Floats
-from geounfold.io.coordinate_columns import (
-    Triple,
-    numbers,
-    plain_name,
-    readable_numbers,
-    side_families,
-)
+from geounfold.io.coordinate_columns import numbers, readable_numbers
 from geounfold.io.messages import listing
+from geounfold.io.packages.names import Triple, plain_name, side_sets
 
 
 def size_columns(names: Sequence[str]) -> Triple | None:
@@ -36,7 +31,7 @@ def size_columns(names: Sequence[str]) -> Triple | None:
     ('XINC', 'YINC', 'ZINC')
     """
     plain = [plain_name(name) for name in names]
-    found = side_families(names)
+    found = side_sets(names)
     if not found:
         return None
     if len(found) > 1 or any(plain.count(name) > 1 for name in found[0]):

@@ -13,77 +13,22 @@ from geounfold.errors import InputError, OptionError
 from geounfold.geometry.mesh import Bools, Floats
 from geounfold.io.column_values import objects
 from geounfold.io.messages import counted, listing, shown
-
-Triple = tuple[str, str, str]
-
-# As plain_name returns them: "X_Centre (m)" is xcentre.
-_PATTERNS = (
-    "centroid{}",
-    "{}centroid",
-    "{}",
-    "{}c",
-    "{}centre",
-    "{}center",
-    "centre{}",
-    "center{}",
-    "mid{}",
-    "{}mid",
-    "{}coord",
-    "coord{}",
-    "{}world",
-    "world{}",
-)
-
-_WORLD = (("xworld", "yworld", "zworld"), ("worldx", "worldy", "worldz"))
-
-_NAMED = (("easting", "northing", "elevation"), ("east", "north", "elevation"))
-
-_FAMILIES: tuple[Triple, ...] = (
-    *((p.format("x"), p.format("y"), p.format("z")) for p in _PATTERNS),
-    *_NAMED,
-)
-
-_SIDE_PATTERNS = (
-    "{}inc", "{}increment", "d{}", "{}size", "size{}", "{}blocksize", "blocksize{}", "{}length",
-    "length{}", "{}len", "dim{}", "{}dim", "{}dimension", "{}width", "block{}", "{}block",
-)  # fmt: skip
-
-_SIDES: tuple[Triple, ...] = tuple(
-    (p.format("x"), p.format("y"), p.format("z")) for p in _SIDE_PATTERNS
-)
-
-# Tried only if none of the above is complete, so x, y, z beside elevation is not ambiguous.
-_MIXED: tuple[Triple, ...] = tuple(
-    (a, b, c)
-    for a, b in (("easting", "northing"), ("east", "north"), ("x", "y"), ("e", "n"))
-    for c in ("elevation", "elev", "rl", "z", "altitude", "level")
-    if (a, b, c) not in _FAMILIES
+from geounfold.io.packages.names import (
+    DEGREES,
+    WORLD,
+    Triple,
+    coordinate_sets,
+    plain_name,
 )
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)"
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d{1,3}(?:[. '\u00a0\u2009\u202f]?\d{3})*,\d+|[+-]?\d+,\d+")
 
+_WORLD_NAMES = frozenset(sum(WORLD, ()))
+
 MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "null", "none", "<na>", "nil"})
 """Words, in any letter case, that mean no value."""
-
-
-def plain_name(name: object) -> str:
-    """Return a column name without case, unit in brackets, spaces and underscores."""
-    bare = re.sub(r"[(\[][^)\]]*[)\]]\s*$", "", str(name))
-    return re.sub(r"[\s_\-.]+", "", bare).casefold()
-
-
-def side_families(names: Sequence[str]) -> list[Triple]:
-    """Return the sets of column names that may be blocks' sides, as `plain_name` returns them.
-
-    Examples
-    --------
-    >>> side_families(["x", "y", "z", "XINC", "YINC", "ZINC"])
-    [('xinc', 'yinc', 'zinc')]
-    """
-    plain = {plain_name(name) for name in names}
-    return [family for family in _SIDES if set(family) <= plain]
 
 
 def parse_columns(text: str) -> Triple:
@@ -139,15 +84,14 @@ def coordinate_columns(
             raise InputError(f"{source}: the columns {listing(columns)} are not three columns")
         return a, b, c
     plain = [plain_name(name) for name in names]
-    for tier in (_FAMILIES, _MIXED):
-        found = [family for family in tier if set(family) <= set(plain)]
-        in_world = [family for family in found if family in _WORLD]
-        if own:
-            found = [family for family in found if family not in _WORLD]
-        elif in_world:
-            found = in_world
-        if found:
-            return _only(found, names, plain, source)
+    found = _sets(names, own)
+    if found:
+        return _only(found, names, plain, source)
+    if any(plan <= set(plain) for plan in map(set, DEGREES)):
+        raise InputError(
+            f"{source}: longitudes and latitudes are degrees, and a body needs one unit of length "
+            "along all axes; project them to metres (UTM or the mine's grid) and export again"
+        )
     if _all_numbers(names):
         hint = "the first row must name the columns"
     elif len(names) == 1:
@@ -158,6 +102,14 @@ def coordinate_columns(
         f"{source}: no coordinate columns (such as x, y, z or centroid_x, centroid_y, "
         f"centroid_z) found; the file has: {listing(names)}; {hint}"
     )
+
+
+def _sets(names: Sequence[str], own: bool) -> list[Triple]:
+    """Return the sets of coordinates to choose from; ``own``: without the world's."""
+    if own:
+        return coordinate_sets([n for n in names if plain_name(n) not in _WORLD_NAMES])
+    found = coordinate_sets(names)
+    return [family for family in found if family in WORLD] or found
 
 
 def _all_numbers(names: Sequence[str]) -> bool:

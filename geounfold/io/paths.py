@@ -8,10 +8,16 @@ from geounfold.errors import InputError
 from geounfold.io.messages import shown
 
 TABLE_ENDINGS = (".csv", ".csv.gz", ".parquet")
+"""Endings of tables that are written, and read."""
+
+_TEXT = (".csv", ".txt", ".asc", ".tsv", ".dat", ".xyz", ".prn")
+
+TEXT_ENDINGS = (*(f"{kind}.gz" for kind in _TEXT), *_TEXT)
+"""Endings of text tables that are read."""
 
 
 def ending(path: Path) -> str:
-    """Return a file's ending in lower case; ``.csv.gz`` counts as one.
+    """Return a file's ending in lower case; that of a compressed text, ``.csv.gz``, counts as one.
 
     Examples
     --------
@@ -19,7 +25,7 @@ def ending(path: Path) -> str:
     '.csv.gz'
     """
     name = path.name.lower()
-    return ".csv.gz" if name.endswith(".csv.gz") else Path(name).suffix
+    return next((kind for kind in TEXT_ENDINGS if name.endswith(kind)), Path(name).suffix)
 
 
 def existing_file(path: Path) -> Path:

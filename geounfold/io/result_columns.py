@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from geounfold.geometry.mesh import Floats
-from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
+from geounfold.io.coordinate_columns import coordinate_columns, numbers
+from geounfold.io.packages.names import Triple
 
 if TYPE_CHECKING:
     from geounfold.mapping.carried import Carried

@@ -22,7 +22,8 @@ from geounfold.backends.threads import cores
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.io.column_values import TextKind
-from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
+from geounfold.io.coordinate_columns import coordinate_columns, numbers
+from geounfold.io.packages.names import Triple
 from geounfold.io.result_columns import (
     FOLDED,
     UNFOLDED,

@@ -17,7 +17,7 @@ from geounfold.cli.inputs.points import read_table, where_of
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, write_json
-from geounfold.io.coordinate_columns import Triple
+from geounfold.io.packages.names import Triple
 from geounfold.io.paths import existing_file
 from geounfold.io.result_columns import UNFOLDED, world_columns
 from geounfold.io.tables.parted import PartedTable

@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError, OptionError
-from geounfold.io.coordinate_columns import Triple, parse_columns
+from geounfold.io.coordinate_columns import parse_columns
+from geounfold.io.packages.names import Triple
 
 if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats

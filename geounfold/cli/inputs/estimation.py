@@ -86,7 +86,7 @@ def _table(samples: PointTable, args: Namespace) -> pd.DataFrame:
 def _hole(samples: PointTable) -> str | None:
     """Return the column of the holes' names, if there is exactly one."""
     from geounfold.drillholes import ALIASES
-    from geounfold.io.coordinate_columns import plain_name
+    from geounfold.io.packages.names import plain_name
 
     aliases = ALIASES["assay"]["hole"]
     found = [str(name) for name in samples.frame.columns if plain_name(name) in aliases]

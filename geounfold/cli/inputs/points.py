@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_points
-from geounfold.io.coordinate_columns import Triple, parse_columns
+from geounfold.io.coordinate_columns import parse_columns
+from geounfold.io.packages.names import Triple
 from geounfold.io.paths import TABLE_ENDINGS, ending
 from geounfold.io.selection import Where, read_where
 from geounfold.io.tables.points import Place
@@ -86,7 +87,7 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
         path, triple(columns),
         prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,
     )  # fmt: skip
-    _warn_of_dropped(table, path, console)
+    _tell(table, path, console)
     return table
 
 
@@ -135,7 +136,7 @@ def open_table(
         where=where_of(args),
         element=args.element,
     )
-    _warn_of_dropped(table, args.points, console)
+    _tell(table, args.points, console)
     return table
 
 
@@ -150,6 +151,9 @@ def read_samples(args: Namespace, console: Console) -> PointTable | None:
     ).only()  # fmt: skip
 
 
-def _warn_of_dropped(table: PointTable | PointStream, path: str, console: Console) -> None:
+def _tell(table: PointTable | PointStream, path: str, console: Console) -> None:
+    """Tell what was skipped or assumed in reading, and warn of rows that were left out."""
+    if table.notes:
+        console.note(f"{path}: {'; '.join(table.notes)}")
     if len(table.dropped):
         console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")

@@ -76,6 +76,13 @@ class Console:
             self._clear()
             self._write(f"geounfold: warning: {_one_line(text)}\n")
 
+    def note(self, text: str) -> None:
+        """Tell what was assumed, in a pipe too, unless quiet; the same words once only."""
+        if not self._quiet and text not in self._warned:
+            self._warned.add(text)
+            self._clear()
+            self._write(f"geounfold: note: {_one_line(text)}\n")
+
     def error(self, text: str) -> None:
         """Say in one line why nothing came of it."""
         self._clear()

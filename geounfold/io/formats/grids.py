@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geounfold.geometry.mesh import Floats, Ints
-from geounfold.io.coordinate_columns import side_families
+from geounfold.io.packages.names import side_sets
 
 _SIDES = ("dx", "dy", "dz")
 _INDICES = ("i", "j", "k")
@@ -147,7 +147,7 @@ def with_sides(
     """
     names = {name.casefold() for name in data}
     out = dict(data)
-    if not side_families(list(data)) and not names & set(_SIDES):
+    if not side_sets(list(data)) and not names & set(_SIDES):
         out |= dict(zip(_SIDES, np.asarray(sides, dtype=np.float64).T, strict=True))
     if ijk is not None and not names & set(_INDICES):
         out |= dict(zip(_INDICES, np.asarray(ijk, dtype=np.int64).T, strict=True))

@@ -23,6 +23,24 @@ _MISSING = re.compile(r"missing values are (\S+)")
 _MOST_COLUMNS = 10_000
 
 
+def has_header(head: bytes) -> bool:
+    """Return whether a text begins as GSLIB files do.
+
+    The second line begins with the number of columns, that many lines of names follow, and the
+    next line has that many numbers.
+    """
+    lines = head.decode("utf-8-sig", errors="replace").splitlines()
+    words = lines[1].split() if len(lines) > 1 else []
+    if not words or not words[0].isdecimal() or not 1 <= int(words[0]) <= _MOST_COLUMNS:
+        return False
+    count = int(words[0])
+    row = lines[2 + count].split() if len(lines) > 2 + count else []
+    try:
+        return len([float(word) for word in row]) == count
+    except ValueError:
+        return False
+
+
 def read_frame(path: Path) -> pd.DataFrame:
     """Return the columns as numbers; repeated names are numbered.
 

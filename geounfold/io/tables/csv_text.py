@@ -1,14 +1,10 @@
-"""CSV files: content, header, rows as text, and tables written as CSV text."""
+"""Text tables: content, rows as text, and tables written as CSV text."""
 
 from __future__ import annotations
 
-import codecs
-import csv
 import gzip
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
-from itertools import chain
 from pathlib import Path
 from typing import IO, Any, overload
 
@@ -18,50 +14,67 @@ import pandas as pd
 from geounfold.errors import InputError
 from geounfold.io.column_values import objects
 from geounfold.io.paths import ending
+from geounfold.io.tables.layout import BLANKS, TextLayout
 
-_LINE_END = re.compile(rb"\r\n|\n|\r")
-_MOST_COLUMNS = 1 << 16  # names in the first row beyond which the file is no table
 _CHUNK = 1 << 20  # bytes unpacked at once
 _ROOM = 1 << 28  # bytes that every compressed table may unpack to
 _RATIO = 100  # times its size that a larger one may unpack to; tables of points: 3 to 10
 
-_FOREIGN = {
-    b"PAR1": "a Parquet file: name it .parquet",
-    b"\x1f\x8b": "compressed by gzip: name it .csv.gz",
-    b"PK\x03\x04": "a zip archive, perhaps a spreadsheet: export it as CSV",
-    b"\xd0\xcf\x11\xe0": "an old spreadsheet: export it as CSV",
-    b"\xff\xfe": "in UTF-16: save it as UTF-8",
-    b"\xfe\xff": "in UTF-16: save it as UTF-8",
-}
+
+@overload
+def csv_reader(stream: IO[bytes], layout: TextLayout, batch: None = None) -> pd.DataFrame: ...
 
 
 @overload
 def csv_reader(
-    stream: IO[bytes], columns: int, separator: str, skip: int, batch: None = None
-) -> pd.DataFrame: ...
-
-
-@overload
-def csv_reader(
-    stream: IO[bytes], columns: int, separator: str, skip: int, batch: int
+    stream: IO[bytes], layout: TextLayout, batch: int
 ) -> AbstractContextManager[Iterable[pd.DataFrame]]: ...
 
 
-def csv_reader(
-    stream: IO[bytes], columns: int, separator: str, skip: int, batch: int | None = None
-) -> Any:
-    """Return a CSV's columns as text, numbered from 0; with ``batch``, batches of its rows."""
+def csv_reader(stream: IO[bytes], layout: TextLayout, batch: int | None = None) -> Any:
+    """Return the columns of a text in UTF-8, numbered from 0; with ``batch``, batches of its rows.
+
+    The stream stands where the data begin.
+    """
     return pd.read_csv(
         stream,
-        sep=separator,
+        sep=layout.separator,
         header=None,
-        skiprows=skip,
-        names=range(columns),
+        names=range(len(layout.names)),
         dtype=str,
         na_filter=False,
-        encoding="utf-8-sig",
+        encoding="utf-8",
         chunksize=batch,
     )
+
+
+def named_frame(frame: pd.DataFrame, layout: TextLayout, path: str | Path) -> pd.DataFrame:
+    """Return rows as `csv_reader` gives them with the columns' names and decimal points.
+
+    Raises
+    ------
+    InputError
+        Rows have more values than there are names, or a row whose columns are separated by blanks
+        has fewer.
+    """
+    if not isinstance(frame.index, pd.RangeIndex):
+        more = frame.index.nlevels + len(layout.names)
+        raise InputError(
+            f"{path}: is not a well-formed table: the names are of {len(layout.names)} columns, "
+            f"but rows have up to {more} values"
+        )
+    if layout.separator == BLANKS and frame.shape[1]:
+        short = frame.iloc[:, -1].replace("", np.nan).isna().to_numpy(dtype=bool)
+        if short.any():
+            row = frame.index.start + int(short.argmax()) + 1
+            raise InputError(
+                f"{path}: data row {row} has fewer values than the "
+                f"{len(layout.names)} columns that blanks separate, so their places are not known; "
+                "write missing values as NA"
+            )
+    frame = frame.fillna("").reset_index(drop=True)  # the fields that a short row lacks
+    frame.columns = pd.Index(layout.names, dtype=object)
+    return layout.with_points(frame, path)
 
 
 def most_unpacked(path: Path) -> int:
@@ -77,7 +90,7 @@ def text_content(path: Path) -> bytes:
     InputError
         The file would unpack to more bytes than `most_unpacked`.
     """
-    if ending(path) != ".csv.gz":
+    if not ending(path).endswith(".gz"):
         return path.read_bytes()
     chunks, total = [], 0
     most = most_unpacked(path)
@@ -91,47 +104,6 @@ def text_content(path: Path) -> bytes:
                     "if it is one, unpack it first"
                 )
     return b"".join(chunks)
-
-
-def csv_header(path: Path, content: bytes) -> tuple[list[str], str, int]:
-    """Return a CSV's column names, its separator, and the number of rows down to the header.
-
-    Raises
-    ------
-    InputError
-        The content is of another format, binary or empty, or its first row is no header.
-    """
-    for magic, what in _FOREIGN.items():
-        if content.startswith(magic):
-            raise InputError(f"{path}: is not a CSV table but {what}")
-    if b"\0" in content:  # the parser would cut a value short at it
-        raise InputError(f"{path}: is not a table: it holds binary data")
-    blank = 0
-    lines = _lines(content)
-    for line in lines:
-        if line.strip():
-            break
-        blank += 1
-    else:
-        raise InputError(f"{path}: the file is empty")
-    bare = "".join(line.split('"')[::2])  # the text outside quotes
-    separator = max(",;\t", key=bare.count)
-    names = next(csv.reader(chain([line], lines), delimiter=separator))
-    if len(names) > _MOST_COLUMNS:
-        raise InputError(
-            f"{path}: is not a table of points: its first row names {len(names)} columns"
-        )
-    return [n.strip() for n in names], separator, blank + 1
-
-
-def _lines(content: bytes) -> Iterator[str]:
-    """Yield lines with their ends, of any of the three kinds, without a byte-order mark."""
-    start = len(codecs.BOM_UTF8) if content.startswith(codecs.BOM_UTF8) else 0
-    while start < len(content):
-        found = _LINE_END.search(content, start)
-        end = found.end() if found else len(content)
-        yield content[start:end].decode("utf-8")
-        start = end
 
 
 def csv_text(frame: pd.DataFrame, *, header: bool = True) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager
@@ -23,9 +24,14 @@ import pandas as pd
 from geounfold.errors import InputError, OutputError
 from geounfold.io.column_values import TextKind, typed_values
 from geounfold.io.messages import no_elements, shown
-from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file
-from geounfold.io.tables.csv_text import csv_header, csv_reader, csv_text, text_content
+from geounfold.io.packages.names import Triple
+from geounfold.io.paths import TABLE_ENDINGS, TEXT_ENDINGS, ending, existing_file
+from geounfold.io.tables.csv_text import csv_reader, csv_text, named_frame, text_content
+from geounfold.io.tables.encoding import as_utf8, encoding_note, text_encoding
+from geounfold.io.tables.layout import TextLayout, text_layout
 from geounfold.io.tables.parquet import ParquetParts, pyarrow_module
+
+_HEAD = 1 << 16  # bytes in which a GSLIB header is looked for
 
 Writer = Callable[..., None]
 """Writes a DataFrame; a second argument holds the TextKind of columns from a CSV, by name."""
@@ -48,6 +54,8 @@ class Table:
         them.
     element : str
         Name of the element that was read, if the file may hold several.
+    notes : tuple of str
+        What was left out or assumed in reading, a sentence each.
     """
 
     frame: pd.DataFrame
@@ -55,21 +63,27 @@ class Table:
     columns: tuple[str, str, str] | None = None
     meta: Mapping[str, str] = field(default_factory=dict)
     element: str = ""
+    notes: tuple[str, ...] = ()
 
 
-def read_table(path: str | Path, element: str | None = None) -> Table:
+def read_table(
+    path: str | Path, element: str | None = None, *, columns: Triple | None = None
+) -> Table:
     """Return the table in a file.
 
-    A CSV is in UTF-8, with or without a byte-order mark. Its first row names the columns. Commas,
-    semicolons or tabs separate them; the first row shows which.
+    A text table is in UTF-8, UTF-16 or Windows-1252 (see `text_encoding`). Its columns are
+    separated by commas, semicolons, tabs, bars or blanks. Lines above their names, and rows of
+    units or types below, are left out (see `text_layout`).
 
     Parameters
     ----------
     path : path
-        A file ending in .csv, .csv.gz or .parquet, or as one of `formats.point_endings`. Points
-        of those formats become columns x, y, z.
+        A file whose ending is one of `TEXT_ENDINGS`, .parquet, or one of `formats.point_endings`.
+        Points of those formats become columns x, y, z.
     element : str, optional
         Name of the element to read, for a file of several (OMF, geoh5).
+    columns : three str, optional
+        Names of the coordinates, by which the row of names is found.
 
     Raises
     ------
@@ -82,12 +96,12 @@ def read_table(path: str | Path, element: str | None = None) -> Table:
     path = Path(path)
     kind = ending(path)
     existing_file(path)
-    if kind in TABLE_ENDINGS:
+    if kind == ".parquet" or (kind in TEXT_ENDINGS and not is_gslib(path, kind)):
         if element is not None:
             raise no_elements(path)
-        table = _read_parquet(path) if kind == ".parquet" else _read_csv(path)
+        table = _read_parquet(path) if kind == ".parquet" else _read_text(path, columns)
     else:
-        table = _read_format(path, kind, element)
+        table = _read_format(path, ".gslib" if kind in TEXT_ENDINGS else kind, element)
     if not len(table.frame):
         raise InputError(f"{path}: the table has a header but no rows")
     return table
@@ -99,7 +113,7 @@ def _read_format(path: Path, kind: str, element: str | None) -> Table:
 
     found = find_format(kind, "reads_points")
     if found is None:
-        endings = ", ".join((*TABLE_ENDINGS, *point_endings()))
+        endings = ", ".join(dict.fromkeys((*TABLE_ENDINGS, *TEXT_ENDINGS, *point_endings())))
         raise InputError(f"{path}: unknown kind of table '{kind}'; files end in {endings}")
     module = found.load()
     if element is not None and not found.elements:
@@ -111,41 +125,54 @@ def _read_format(path: Path, kind: str, element: str | None) -> Table:
 
 
 @contextmanager
-def _as_input_error(path: Path) -> Iterator[None]:
-    """Raise InputError, in one line, for the exceptions that readers raise on a damaged file."""
+def _as_input_error(path: Path, layout: TextLayout | None = None) -> Iterator[None]:
+    """Raise InputError, in one line, for the exceptions that readers raise on a damaged file.
+
+    ``layout`` is that of the rows that are read; without, nothing but the file is known.
+    """
+    above = 0 if layout is None else layout.lines
     try:
         yield
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not a table in UTF-8; save it as UTF-8") from error
+        raise InputError(f"{path}: is not a table of text; save it as UTF-8") from error
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"{path}: the compressed file is damaged: {error}") from error
     except (csv.Error, pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         if "out of memory" in str(error):
             raise MemoryError from error
         words = str(error).removeprefix("Error tokenizing data. C error: ").strip()
+        words = re.sub(r"(?<=\bline )\d+", lambda found: str(int(found[0]) + above), words)
         raise InputError(f"{path}: is not a well-formed table: {words}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
-def _read_csv(path: Path) -> Table:
-    """Return a CSV's columns as text."""
+def is_gslib(path: Path, kind: str) -> bool:
+    """Return whether a text file has a GSLIB header, which any of the endings may have."""
+    if kind.endswith(".gz"):
+        return False
+    from geounfold.io.formats.gslib import has_header
+
+    with path.open("rb") as stream:
+        return has_header(stream.read(_HEAD))
+
+
+def _read_text(path: Path, columns: Triple | None) -> Table:
+    """Return a text table's columns as text."""
     with _as_input_error(path):
         content = text_content(path)
-        names, separator, skip = csv_header(path, content)
+        encoding = text_encoding(path, [content])
+        content = as_utf8(content, encoding)
+        layout = text_layout(path, content, columns)
+    with _as_input_error(path, layout):
+        stream = io.BytesIO(content)
+        stream.seek(layout.start)
         try:
-            frame = csv_reader(io.BytesIO(content), len(names), separator, skip)
+            frame = csv_reader(stream, layout)
         except pd.errors.EmptyDataError:
-            frame = pd.DataFrame(columns=range(len(names)), dtype=str)
-    if not isinstance(frame.index, pd.RangeIndex):
-        more = frame.index.nlevels + len(names)
-        raise InputError(
-            f"{path}: is not a well-formed table: the first row names {len(names)} columns, "
-            f"but rows have up to {more} values"
-        )
-    frame = frame.fillna("")  # the fields that a short row lacks
-    frame.columns = pd.Index(names, dtype=object)
-    return Table(frame, text=True)
+            frame = pd.DataFrame(columns=range(len(layout.names)), dtype=str)
+    notes = (*encoding_note(encoding), *layout.notes)
+    return Table(named_frame(frame, layout, path), text=True, notes=notes)
 
 
 def _read_parquet(path: Path) -> Table:

@@ -25,12 +25,15 @@ from geounfold.errors import InputError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.column_values import TextKind
-from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
-from geounfold.io.paths import TABLE_ENDINGS, ending
+from geounfold.io.coordinate_columns import coordinate_columns, numbers
+from geounfold.io.packages.names import Triple
+from geounfold.io.paths import TEXT_ENDINGS, ending
 from geounfold.io.selection import Where, column_position
 from geounfold.io.selection.labels import codes_of
-from geounfold.io.tables.csv_text import csv_header, csv_reader, most_unpacked
-from geounfold.io.tables.files import table_writer, with_columns
+from geounfold.io.tables.csv_text import csv_reader, most_unpacked, named_frame
+from geounfold.io.tables.encoding import encoding_note, text_encoding, utf8_stream
+from geounfold.io.tables.files import is_gslib, table_writer, with_columns
+from geounfold.io.tables.layout import text_layout
 from geounfold.io.tables.parquet import pyarrow_module
 from geounfold.io.tables.points import Place, PointTable, chosen_facts, read_points
 
@@ -63,6 +66,7 @@ class Source(Protocol):
 
     names: list[str]
     text: bool
+    notes: tuple[str, ...]
 
     def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
         """Yield the rows in batches, of all columns or of some, by position."""
@@ -72,6 +76,7 @@ class ParquetSource:
     """A Parquet file."""
 
     text = False
+    notes: tuple[str, ...] = ()
 
     def __init__(self, path: Path) -> None:
         self._file = pyarrow_module().parquet.ParquetFile(path)
@@ -93,44 +98,45 @@ class ParquetSource:
 
 
 class CsvSource:
-    """A CSV file, whose columns are text."""
+    """A text table, whose columns are text."""
 
     text = True
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, columns: Triple | None = None) -> None:
         self._path = path
-        self._packed = ending(path) == ".csv.gz"
+        self._packed = ending(path).endswith(".gz")
+        self.encoding = text_encoding(path, self._chunks())
         with self._open() as stream:
-            head = stream.read(_HEAD)
-            self.names, self.separator, self.skip = csv_header(path, head)
-        self._check()
+            self.layout = text_layout(path, stream.read(_HEAD), columns)
+        self.names = list(self.layout.names)
+        self.notes = (*encoding_note(self.encoding), *self.layout.notes)
 
-    def _open(self) -> IO[bytes]:
+    def _raw(self) -> IO[bytes]:
         if self._packed:
             return cast(IO[bytes], gzip.open(self._path, "rb"))
         return self._path.open("rb")
 
-    def _check(self) -> None:
-        """Raise InputError if the file is binary or unpacks to more than `most_unpacked`."""
+    def _open(self) -> IO[bytes]:
+        return utf8_stream(self._raw(), self.encoding)
+
+    def _chunks(self) -> Iterator[bytes]:
+        """Yield the content; raise InputError if it unpacks to more than `most_unpacked`."""
         most, total = most_unpacked(self._path), 0
-        with self._open() as stream:
+        with self._raw() as stream:
             while chunk := stream.read(_HEAD):
                 total += len(chunk)
-                if b"\0" in chunk or (self._packed and total > most):
+                if self._packed and total > most:
                     raise InputError(f"{self._path}: is not a table")
+                yield chunk
 
     def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
         """Yield batches of text."""
         with ExitStack() as stack:
             stream = stack.enter_context(self._open())
-            reader = stack.enter_context(
-                csv_reader(stream, len(self.names), self.separator, self.skip, BATCH)
-            )
+            stream.read(self.layout.start)
+            reader = stack.enter_context(csv_reader(stream, self.layout, BATCH))
             for frame in reader:
-                if not isinstance(frame.index, pd.RangeIndex):
-                    raise InputError(f"{self._path}: rows have more values than there are columns")
-                whole = frame.fillna("").reset_index(drop=True)
-                whole.columns = pd.Index(self.names, dtype=object)
+                whole = named_frame(frame, self.layout, self._path)
                 yield whole if columns is None else whole.iloc[:, list(columns)]
 
 
@@ -215,7 +221,13 @@ class PointStream:
             "dropped_rows": self.dropped[:100].tolist(),
             "duplicates": self.duplicates,
             **chosen_facts(self.chosen, self.where),
+            **({"notes": list(self.notes)} if self.notes else {}),
         }
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out or assumed in reading, a sentence each."""
+        return self.rows.notes
 
     def write_parts(self, path: str | Path, make: Make) -> None:
         """Write the table with results added, in batches.
@@ -309,7 +321,7 @@ def open_points(
     keep : bool
         Whether the coordinates of a large file are kept in memory.
     """
-    source = None if element is not None else _large(Path(path))
+    source = None if element is not None else _large(Path(path), columns)
     if source is not None:
         found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep, where)
         if found is not None:
@@ -320,17 +332,19 @@ def open_points(
     )  # fmt: skip
 
 
-def _large(path: Path) -> Source | None:
+def _large(path: Path, columns: Triple | None) -> Source | None:
     """Return the rows of a large table; None for a small or damaged file, or another format."""
     kind = ending(path)
-    if kind not in TABLE_ENDINGS or not path.is_file():
+    if kind not in (".parquet", *TEXT_ENDINGS) or not path.is_file():
         return None
     try:
         if kind == ".parquet":
             parquet = ParquetSource(path)
             return parquet if parquet.rows > BATCH else None
-        size = path.stat().st_size * (4 if kind == ".csv.gz" else 1)
-        return CsvSource(path) if size > LARGE else None
+        size = path.stat().st_size * (4 if kind.endswith(".gz") else 1)
+        if size <= LARGE or is_gslib(path, kind):
+            return None
+        return CsvSource(path, columns)
     except _FAULTS:  # read_points then raises the error
         return None
 

@@ -12,9 +12,11 @@ import pandas as pd
 
 from geounfold.errors import InputError
 from geounfold.io.paths import ending, existing_file
-from geounfold.io.tables.csv_text import csv_reader
+from geounfold.io.tables.csv_text import csv_reader, named_frame
+from geounfold.io.tables.encoding import UTF8
 from geounfold.io.tables.files import read_table
 from geounfold.io.tables.large import BATCH, CsvSource, ParquetSource
+from geounfold.io.tables.layout import TextLayout
 from geounfold.io.tables.parquet import pyarrow_module
 
 BYTES = 1 << 25
@@ -38,8 +40,8 @@ class Part:
         Row groups of a Parquet file, or bytes of a CSV.
     row : int
         Number of rows of the table before this part; blank lines of a CSV count.
-    separator : str
-        A CSV's separator; empty for Parquet.
+    layout : TextLayout or None
+        That of a CSV; None for Parquet.
     """
 
     path: str
@@ -47,32 +49,27 @@ class Part:
     start: int
     stop: int
     row: int
-    separator: str = ""
+    layout: TextLayout | None = None
 
     @property
     def text(self) -> bool:
         """Whether the columns are text because the file is a CSV."""
-        return bool(self.separator)
+        return self.layout is not None
 
     def frame(self) -> pd.DataFrame:
         """Return the rows with every column, as `read_table` returns them."""
-        if self.text:
-            return self._csv_frame()
+        if self.layout is not None:
+            return self._csv_frame(self.layout)
         file = pyarrow_module().parquet.ParquetFile(self.path)
         groups = file.read_row_groups(list(range(self.start, self.stop)))
         frame: pd.DataFrame = groups.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
         return frame
 
-    def _csv_frame(self) -> pd.DataFrame:
+    def _csv_frame(self, layout: TextLayout) -> pd.DataFrame:
         with Path(self.path).open("rb") as stream:
             stream.seek(self.start)
             content = io.BytesIO(stream.read(self.stop - self.start))
-        frame = csv_reader(content, len(self.names), self.separator, 0)
-        if not isinstance(frame.index, pd.RangeIndex):
-            raise InputError(f"{self.path}: rows have more values than there are columns")
-        frame = frame.fillna("")
-        frame.columns = pd.Index(self.names, dtype=object)
-        return frame
+        return named_frame(csv_reader(content, layout), layout, self.path)
 
 
 def parts_of(path: str | Path) -> list[Part]:
@@ -138,40 +135,27 @@ def _parquet_parts(path: Path, row: int) -> tuple[list[Part], int]:
 
 def _csv_parts(path: Path, row: int) -> tuple[list[Part], int]:
     source = CsvSource(path)
+    if source.encoding != UTF8:
+        raise InputError(f"{path}: its text is not in UTF-8; save it as UTF-8")
     names = _names(path, source.names)
-    cuts: list[int] = []
-    rows, seen, size = [0], -source.skip, path.stat().st_size
-    for ends in _row_ends(path):
-        for end in _cuts(ends, seen, (cuts[-1] + BYTES) if cuts else 0):
-            cuts.append(int(ends[end]))
-            rows.append(seen + int(end) + 1)
+    start, size = source.layout.start, path.stat().st_size
+    cuts, rows, seen = [start], [0], 0
+    for every in _row_ends(path):
+        ends = every[every > start]
+        while len(ends) and ends[-1] >= cuts[-1] + BYTES:
+            at = int(np.searchsorted(ends, cuts[-1] + BYTES))
+            cuts.append(int(ends[at]))
+            rows.append(seen + at + 1)
         seen += len(ends)
-    if not cuts or cuts[0] >= size:
+    if start >= size:
         return [], 0
     if cuts[-1] < size:
         cuts.append(size)
     found = [
-        Part(str(path), names, a, b, row + before, source.separator)
-        for a, b, before in zip(cuts[:-1], cuts[1:], rows[1:], strict=False)
+        Part(str(path), names, a, b, row + before, source.layout)
+        for a, b, before in zip(cuts[:-1], cuts[1:], rows, strict=False)
     ]
-    return found, max(seen, 0) + 1
-
-
-def _cuts(ends: np.ndarray, seen: int, due: int) -> Iterator[int]:
-    """Yield the row ends to cut at: the header's, and then the first one after each full part.
-
-    ``seen`` is the number of rows before, counted from the first after the header, and ``due`` the
-    byte from which the next part begins.
-    """
-    if seen < 0 <= seen + len(ends):
-        yield -seen - 1
-        due = int(ends[-seen - 1]) + BYTES
-    elif seen < 0:
-        return
-    while len(ends) and ends[-1] >= due:
-        at = int(np.searchsorted(ends, due))
-        yield at
-        due = int(ends[at]) + BYTES
+    return found, seen + 1
 
 
 def _row_ends(path: Path) -> Iterator[np.ndarray]:

@@ -14,8 +14,9 @@ import pandas as pd
 from geounfold.errors import InputError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.io.coordinate_columns import Triple, coordinate_columns, numbers
+from geounfold.io.coordinate_columns import coordinate_columns, numbers
 from geounfold.io.messages import counted, listing, rows_named, shown
+from geounfold.io.packages.names import Triple
 from geounfold.io.selection import Where, column_position, not_chosen
 from geounfold.io.selection.labels import codes_of
 from geounfold.io.tables.files import check_writable, read_table, with_columns, write_table
@@ -50,6 +51,8 @@ class PointTable:
         The expression that chose them.
     element : str
         Name of the element that was read, if the file may hold several.
+    notes : tuple of str
+        What was left out or assumed in reading, a sentence each.
     """
 
     source: str
@@ -62,6 +65,7 @@ class PointTable:
     chosen: Bools | None = None
     where: str = ""
     element: str = ""
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
@@ -156,6 +160,7 @@ class PointTable:
             "duplicates": self.duplicates,
             **chosen_facts(self.chosen, self.where),
             **({"element": self.element} if self.element else {}),
+            **({"notes": list(self.notes)} if self.notes else {}),
             **self.meta,
         }
 
@@ -206,7 +211,7 @@ def read_points(
         coordinates are missing, infinite or too large; or no rows are left.
     """
     source = str(path)
-    table = read_table(path, element)
+    table = read_table(path, element, columns=columns)
     if among is not None and len(among) == len(table.frame):
         table = replace(table, frame=table.frame.loc[among].reset_index(drop=True))
     names = [str(name) for name in table.frame.columns]
@@ -234,7 +239,7 @@ def read_points(
     text = "" if where is None else where.text
     return PointTable(
         source, frame, (a, b, c), points, dropped, table.text, table.meta, chosen, text,
-        table.element,
+        table.element, table.notes,
     )  # fmt: skip
 
 

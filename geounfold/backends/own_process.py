@@ -7,26 +7,24 @@ calls can change the answer.
 
 from __future__ import annotations
 
-import ctypes
 import io
 import os
-import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
+from geounfold.backends.system.parent import end_with
+from geounfold.backends.system.worker import end_of
 from geounfold.errors import BackendError, GeounfoldError
 
 _ROOT = str(Path(__file__).resolve().parents[2])
 _START = "from geounfold.backends.own_process import serve; serve()"
-_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
 
 def call_apart(
@@ -57,7 +55,7 @@ def call_apart(
     try:
         with tempfile.TemporaryDirectory() as folder:  # fTetWild leaves files in its folder
             done = subprocess.run(
-                [sys.executable, "-P", "-c", _START],
+                [sys.executable, "-P", "-c", _START, str(os.getpid())],
                 input=request,
                 capture_output=True,
                 timeout=limit,
@@ -70,7 +68,8 @@ def call_apart(
     except OSError as error:
         raise BackendError(f"{name} could not be started: {error.strerror or error}") from error
     if done.returncode != 0 or not done.stdout:
-        raise BackendError(f"{name} {_end(done.returncode, done.stderr)}")
+        words = done.stderr.decode("utf-8", "replace")
+        raise BackendError(f"{name} {end_of(done.returncode, words)}")
     answer = _unpacked(done.stdout)
     if "error" in answer:
         raise BackendError(f"{name} failed: {answer['error']}")
@@ -79,10 +78,7 @@ def call_apart(
 
 def serve() -> None:
     """Read one call from stdin, run it, and write its arrays or its error to stdout."""
-    with suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(
-            _DEATH_SIGNAL, signal.SIGKILL
-        )  # Linux: this process ends with its caller
+    end_with(int(sys.argv[1]))
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what the library prints
     _answer(sys.stdin.buffer, answer)
@@ -107,14 +103,6 @@ def _search_path() -> str:
     """Return PYTHONPATH as absolute paths, this package's own folder first."""
     given = filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))
     return os.pathsep.join([_ROOT, *(str(Path(path).resolve()) for path in given)])
-
-
-def _end(code: int, stderr: bytes) -> str:
-    """Return words for how a process ended that wrote no answer."""
-    if code < 0:
-        return f"crashed ({signal.Signals(-code).name})"
-    last = stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-    return "ended without an answer" + (f": {last[0].strip()}" if last else "")
 
 
 def _packed(arrays: Mapping[str, Any]) -> bytes:

@@ -6,35 +6,15 @@ and do not depend on each other, so the answer is the same for every number of c
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from geounfold.backends.system.processors import cores
+
+__all__ = ["cores", "over_slices", "slices"]
+
 T = TypeVar("T")
-
-
-def memory_is_limited() -> bool:
-    """Return whether the process's memory is limited (``ulimit -v``)."""
-    if sys.platform == "win32":
-        return False
-    import resource
-
-    return bool(resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY)
-
-
-def cores() -> int:
-    """Return how many cores this process may use.
-
-    If its memory is limited, one: Python waits for ever for a thread that finds no memory to
-    start.
-    """
-    if memory_is_limited():
-        return 1
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def slices(count: int, size: int) -> Iterator[slice]:

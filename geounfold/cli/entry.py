@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
 
-from geounfold.backends.threads import memory_is_limited
+from geounfold.backends.system.console import speak_to_any_console
+from geounfold.backends.system.memory import memory_is_limited
+from geounfold.backends.system.signals import STOPS, ignore_stops, stop_of, stoppable
 from geounfold.cli.arguments.parser import parse
 from geounfold.cli.process.journal import Journal
-from geounfold.cli.process.signals import STOPS, ignore_stops, stop_of, stoppable
 from geounfold.cli.process.supervise import supervised
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError
@@ -43,15 +44,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         0 done, 2 the input or an option is wrong, 1 any other failure, 130 interrupted,
         143 terminated, 129 hung up.
     """
+    speak_to_any_console()
     if argv is not None:
         with stoppable():
             return _guarded(list(argv), Journal(), lambda: None)
     words = sys.argv[1:]
     return supervised(
-        lambda journal, ready: _guarded(words, journal, ready),
-        Console(quiet="--quiet" in words),
-        verbose=_verbose(words),
+        f"{__name__}:run_apart", words, Console(quiet="--quiet" in words), verbose=_verbose(words)
     )
+
+
+def run_apart(words: list[str], journal: int | None, ready: Callable[[], None]) -> int:
+    """Run a command in the process that `supervised` has made for it; see `Run`."""
+    speak_to_any_console()
+    return _guarded(words, Journal(journal), ready)
 
 
 def _guarded(words: Sequence[str], journal: Journal, ready: Callable[[], None]) -> int:

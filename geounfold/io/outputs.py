@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+from geounfold.backends.system import files
 from geounfold.errors import OutputError
 from geounfold.io.messages import shown
 from geounfold.io.paths import ending
@@ -96,10 +97,11 @@ class Outputs:
         }
         sources = [Path(p) for p in inputs]
         for name, target in targets.items():
-            twin = next((n for n in targets if n != name and _same(targets[n], target)), None)
+            twins = (n for n in targets if n != name and files.same_file(targets[n], target))
+            twin = next(twins, None)
             if twin is not None:
                 raise OutputError(f"{target}: {name} and {twin} name the same file")
-            if any(_same(target, source) for source in sources):
+            if any(files.same_file(target, source) for source in sources):
                 raise OutputError(f"{target}: {name} is also an input; choose another file")
             _check_replaceable(target, overwrite)
         watcher = watcher or _NoWatcher()
@@ -129,11 +131,11 @@ class Outputs:
                 parts = {n: folders[t.parent] / t.name for n, t in self.paths.items()}
                 yield dict(parts)
                 for part in parts.values():
-                    _flush(part)
+                    files.flush(part)
                 with self.watcher.committing():
                     self._publish(parts)
                 for folder in folders:
-                    _flush(folder)
+                    files.flush(folder)
         finally:
             for part_folder in folders.values():
                 shutil.rmtree(part_folder, ignore_errors=True)
@@ -147,10 +149,10 @@ class Outputs:
                 if self.overwrite and os.path.lexists(target):
                     _check_replaceable(target, self.overwrite)
                     old = part.with_name(f"{part.name}.old")
-                    _keep(target, old)
+                    files.keep(target, old)
                     shutil.copymode(target, part)
-                    os.replace(part, target)  # noqa: PTH105
-                    undo.append(partial(os.replace, old, target))
+                    files.replace(part, target)
+                    undo.append(partial(files.replace, old, target))
                 else:
                     _move_new(part, target)
                     undo.append(target.unlink)
@@ -199,17 +201,17 @@ def whole_folder(
             fresh.mkdir()
             yield fresh
             for file in fresh.iterdir():
-                _flush(file)
+                files.flush(file)
             with watcher.committing():
                 _check_folder(target, overwrite)
                 old = part / f"{target.name}.old"
                 if target.exists():
-                    target.rename(old)
+                    files.move(target, old)
                 try:
-                    fresh.rename(target)
+                    files.move(fresh, target)
                 except BaseException:
                     if old.exists():
-                        old.rename(target)
+                        files.move(old, target)
                     raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
@@ -227,8 +229,10 @@ def _check_folder(target: Path, overwrite: bool) -> None:
 
 def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
     """Return the path that links lead to, after checking its ending."""
+    if fault := files.fault_of_name(path):
+        raise OutputError(f"{name}: '{shown(path)}': {fault} on this system; choose another")
     try:
-        target = path.resolve()
+        target = files.unlimited(path.resolve())
         is_folder = target.is_dir()
     except (OSError, ValueError, RuntimeError) as error:
         raise OutputError(f"{name}: '{shown(path)}' is not a valid path: {error}") from error
@@ -237,14 +241,6 @@ def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
     if endings and ending(path) not in endings:
         raise OutputError(f"{path}: {name} must end in {' or '.join(endings)}")
     return target
-
-
-def _same(a: Path, b: Path) -> bool:
-    """Return whether two paths lead to one file, hard links included."""
-    try:
-        return a.resolve() == b.resolve() or a.samefile(b)
-    except (OSError, ValueError, RuntimeError):  # the second is missing or not a valid path
-        return False
 
 
 def _check_replaceable(target: Path, overwrite: bool) -> None:
@@ -295,49 +291,11 @@ def _as_output_error(targets: Iterable[Path]) -> Iterator[None]:
         ) from error
 
 
-def _flush(path: Path) -> None:
-    """Write a file's or folder's cached data to the disk."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # the file system has no such call
-            raise
-    finally:
-        os.close(handle)
-
-
-def _keep(target: Path, old: Path) -> None:
-    """Keep a file under a second name until its replacement is in place."""
-    try:
-        os.link(target, old)
-    except OSError:  # a file system without hard links
-        shutil.copy2(target, old)
-
-
 def _move_new(part: Path, target: Path) -> None:
-    """Move a file in place unless the target exists, checked and moved in one step."""
+    """Move a file in place unless the target exists."""
     try:
-        os.link(part, target)
+        files.move_new(part, target)
     except FileExistsError as error:
         raise OutputError(
             f"{target}: the file has appeared meanwhile; --overwrite replaces it"
         ) from error
-    except OSError:  # a file system without hard links
-        _claim(part, target)
-
-
-def _claim(part: Path, target: Path) -> None:
-    """Make the target as an empty file, unless it exists, and then replace that."""
-    try:
-        os.close(os.open(target, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
-    except FileExistsError as error:
-        raise OutputError(
-            f"{target}: the file has appeared meanwhile; --overwrite replaces it"
-        ) from error
-    try:
-        os.replace(part, target)  # noqa: PTH105
-    except BaseException:
-        with suppress(OSError):
-            target.unlink()
-        raise

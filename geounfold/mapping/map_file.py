@@ -28,6 +28,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from geounfold.backends.system import files
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
@@ -180,11 +181,10 @@ def _write_whole(path: Path, content: bytes) -> None:
     try:
         with part.open("xb") as stream:
             stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
+        files.flush(part)
         if target.exists():
             shutil.copymode(target, part)
-        os.replace(part, target)  # noqa: PTH105
+        files.replace(part, target)
     except BaseException:
         with suppress(OSError):
             part.unlink()

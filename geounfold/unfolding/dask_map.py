@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from geounfold.backends.system import files
 from geounfold.backends.threads import cores
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.geometry.measures import LARGEST_COORDINATE
@@ -250,7 +251,7 @@ def _carry_part(
     with table_writer(fresh) as write:
         own = {name: kind for name, kind in kinds.items() if name not in results}
         write(with_columns(frame, results), own)
-    fresh.replace(target)
+    files.replace(fresh, target)
     location = results["location"]
     return {
         "carried": len(points),

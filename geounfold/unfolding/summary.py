@@ -10,7 +10,7 @@ import numpy as np
 
 from geounfold._version import __version__
 from geounfold.backends.igl import boundary_loops, is_manifold
-from geounfold.backends.memory import peak_memory_mb
+from geounfold.backends.system.memory import peak_memory_mb
 from geounfold.body.check import count_duplicates
 from geounfold.body.parts import Junction
 from geounfold.body.prepare import PreparedPoints

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from geounfold.backends import threads
+from geounfold.backends.system.memory import memory_is_limited
 
 CODE = """
 import hashlib, sys
@@ -60,12 +61,14 @@ def test_where_memory_is_limited_there_are_no_threads_to_wait_for():
     code = """
 import resource
 from geounfold.backends import threads
-before = threads.memory_is_limited()
+from geounfold.backends.system.memory import memory_is_limited
+before = memory_is_limited()
 limit = 1 << 40
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-print(before, threads.memory_is_limited(), threads.cores())
+print(before, memory_is_limited(), threads.cores())
 """
-    if threads.memory_is_limited():
+    pytest.importorskip("resource", reason="Windows has no limit of memory")
+    if memory_is_limited():
         pytest.skip("the tests run with limited memory themselves")
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60

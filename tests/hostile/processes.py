@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
-import pty
 import select
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+import pytest
+
+from tests.places import ROOT
+
+pty = pytest.importorskip("pty", reason="Windows has no such terminal: see test_guard.py")
+
+IMITATION = ROOT / "tests" / "imitation"
 
 LONG = 120.0  # seconds after which a test gives up on a process; nothing is timed
 
@@ -26,16 +33,24 @@ def heed_stops() -> None:
         signal.signal(stop, signal.SIG_DFL)
 
 
+def with_fault(script: Path | None = None, **more: str) -> dict[str, str]:
+    """Return an environment in which each new Python runs a script first."""
+    if script is not None:
+        more["GEOUNFOLD_FAULT"] = str(script)
+    path = [str(IMITATION), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path), **more}
+
+
 class Run:
     """A command in a process whose stderr is a terminal."""
 
-    def __init__(self, *argv: str, cwd: Path, script: str = "", **settings: object) -> None:
+    def __init__(self, *argv: str, cwd: Path, fault: Path | None = None, **settings: object):
         self._master, slave = pty.openpty()
         settings.setdefault("preexec_fn", heed_stops)
-        how = ["-c", script] if script else ["-m", "geounfold"]
         self.process = subprocess.Popen(
-            [sys.executable, *how, *argv],
+            [sys.executable, "-m", "geounfold", *argv],
             cwd=cwd,
+            env=with_fault(fault),
             stdout=subprocess.PIPE,
             stderr=slave,
             **settings,  # type: ignore[call-overload]
@@ -57,8 +72,8 @@ class Run:
 
     def workers(self) -> list[int]:
         """Return the processes that this one has started."""
-        pid = self.process.pid
-        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        psutil = pytest.importorskip("psutil", reason="it finds the processes")
+        return [child.pid for child in psutil.Process(self.process.pid).children()]
 
     def end(self) -> tuple[int, str]:
         """Return the exit status and what stays on the terminal."""

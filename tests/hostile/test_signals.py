@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from geounfold.backends.system.signals import stoppable
 from geounfold.cli.process.journal import Account, Journal
-from geounfold.cli.process.signals import stoppable
 from tests.hostile.processes import LONG, UNFOLD, Run, state_of
 
 LINES = {
@@ -142,30 +142,32 @@ def test_a_run_that_cannot_react_is_left_at_once(folder: Path) -> None:
 
 
 ENDLESS = """
-import itertools, sys
+import itertools
 import geounfold.cli.entry as entry
-from geounfold.io import Outputs
 def endless(args, console):
+    from geounfold.io import Outputs
     outputs = Outputs.planned({'o': ('new.csv', ())}, watcher=console.journal)
     with outputs.writing() as parts:
         parts['o'].write_text('half')
         console.stage('endless')
         END
 entry._command = lambda name: endless
-sys.argv = ['geounfold', 'simulate', '--list']
-sys.exit(entry.main())
 """
 
 
-def _in_a_call(end: str, folder: Path) -> Run:
-    return Run(cwd=folder, script=ENDLESS.replace("END", end)).until("endless")
+def _in_a_call(end: str, tmp_path_factory: pytest.TempPathFactory, folder: Path) -> Run:
+    fault = tmp_path_factory.mktemp("fault") / "fault.py"
+    fault.write_text(ENDLESS.replace("END", end), encoding="utf-8")
+    return Run("simulate", "--list", cwd=folder, fault=fault).until("endless")
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
-def test_stopped_inside_a_call_that_never_returns(sent: signal.Signals, folder: Path) -> None:
+def test_stopped_inside_a_call_that_never_returns(
+    sent: signal.Signals, folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     before = state_of(folder)
     # sum() keeps the interpreter to itself and does not look at signals.
-    run = _in_a_call("sum(itertools.repeat(1))", folder).send(sent)
+    run = _in_a_call("sum(itertools.repeat(1))", tmp_path_factory, folder).send(sent)
     assert run.end() == LINES[sent]
     assert state_of(folder) == before
 
@@ -179,9 +181,11 @@ def test_stopped_inside_a_call_that_never_returns(sent: signal.Signals, folder: 
         ("os.kill(os.getpid(), 9)", "killed, as the system does where memory runs out; nothing"),
     ],
 )
-def test_a_library_that_ends_the_process(end: str, words: str, folder: Path) -> None:
+def test_a_library_that_ends_the_process(
+    end: str, words: str, folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     before = state_of(folder)
-    status, line = _in_a_call(f"import os; {end}", folder).end()
+    status, line = _in_a_call(f"import os; {end}", tmp_path_factory, folder).end()
     assert status == 1
     assert line.startswith(f"geounfold: error: {words}")
     assert line.count("\n") == 1

@@ -244,8 +244,9 @@ def test_memory_does_not_grow_with_the_rows(tmp_path):
         path = tmp_path / f"{count}.parquet"
         pd.DataFrame(pick, columns=["x", "y", "z"]).to_parquet(path, index=False)
         code = (
-            "import resource, sys; from geounfold.cli import main; status = main(sys.argv[1:]);"
-            "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024); sys.exit(status)"
+            "import sys; from geounfold.cli import main; status = main(sys.argv[1:]);"
+            "from geounfold.backends.system.memory import peak_memory_mb;"
+            "print(peak_memory_mb()); sys.exit(status)"
         )
         words = ["map", "m.npz", path.name, "-o", f"out_{count}.parquet", "--quiet"]
         done = subprocess.run(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import platform
+import sys
 from argparse import Namespace
 from collections.abc import Callable
 from importlib import metadata
@@ -12,6 +12,7 @@ from typing import Any
 from packaging.requirements import Requirement
 
 from geounfold._version import __version__
+from geounfold.backends.system.libraries import system_name
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError, MissingDependencyError
 
@@ -51,8 +52,8 @@ def check_up(progress: Progress) -> dict[str, Any]:
     libraries, extras = _libraries()
     return {
         "geounfold": __version__,
-        "python": platform.python_version(),
-        "platform": platform.platform(),
+        "python": sys.version.partition(" ")[0],
+        "platform": system_name(),
         "processors": os.cpu_count(),
         "libraries": libraries,
         "extras": extras,

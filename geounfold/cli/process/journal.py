@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from geounfold.cli.process.signals import unstoppable
+from geounfold.backends.system.signals import unstoppable
 
 _PART, _COMMITTING, _REVOKED, _WRITTEN, _ENDED = b"P", b"C", b"R", b"W", b"E"
 
@@ -77,7 +77,7 @@ class Account:
         Examples
         --------
         >>> Account.of(b"P/tmp/a\0C\0W\0E0\0")
-        Account(parts=(PosixPath('/tmp/a'),), committing=False, written=True, status=0)
+        Account(parts=(...Path('/tmp/a'),), committing=False, written=True, status=0)
         """
         notes = text.split(b"\0")[:-1]
         parts = [Path(os.fsdecode(n[1:])) for n in notes if n[:1] == _PART]

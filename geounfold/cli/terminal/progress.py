@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import Protocol, TextIO, cast
 
+from geounfold.backends.system.console import redraws
 from geounfold.cli.terminal.time_left import Forecast
 
 _TICK = 0.25  # seconds between two drawings of a line that lives
@@ -62,7 +63,7 @@ def progress_on(stream: TextIO, forecast: Forecast, *, plain: bool = False) -> P
         Names and seconds only, as on terminals that cannot move the cursor.
     """
     careful = cast(TextIO, Careful(stream))
-    if plain or os.environ.get("TERM", "").lower() in ("", "dumb", "unknown"):
+    if plain or not redraws(stream) or not find_spec("rich"):
         return PlainProgress(careful, forecast)
     return RichProgress(careful, forecast)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import subprocess
 import sys
@@ -14,10 +13,11 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from geounfold.backends.system.libraries import missing_for_drawing
 from geounfold.backends.threads import cores
 from geounfold.errors import InputError, MissingDependencyError
 from geounfold.geometry.mesh import Bools, Floats
-from geounfold.report.plots.style import LIBRARIES, Image, Limits, ViewOptions, require
+from geounfold.report.plots.style import Image, Limits, ViewOptions, require
 
 _PROBE = """
 import vtkmodules.vtkRenderingOpenGL2
@@ -67,20 +67,12 @@ def check_rendering() -> None:
         [sys.executable, "-c", _PROBE], capture_output=True, check=False, timeout=120
     )
     if probe.returncode:
-        missing = ", ".join(name for name in LIBRARIES if not _loads(name))
+        missing = ", ".join(missing_for_drawing())
         reason = f"{missing} missing" if missing else f"VTK's trial ended with {probe.returncode}"
         raise MissingDependencyError(
             f"cannot draw in three dimensions: {reason}; install OpenGL "
-            "(Debian and Ubuntu: apt-get install libgl1 libegl1)"
+            "(Debian and Ubuntu: apt-get install libgl1 libegl1; Windows and macOS: its own driver)"
         )
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
 
 
 @contextmanager

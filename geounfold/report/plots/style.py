@@ -18,8 +18,6 @@ Limits = tuple[float, float]
 # Okabe and Ito's colours, which colour-blind readers can distinguish.
 TOP, BOTTOM, RIM, UNDECIDED = "#0072B2", "#E69F00", "#999999", "#CC79A7"
 
-LIBRARIES = ("libX11.so.6", "libGL.so.1", "libEGL.so.1")
-
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:

@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from geounfold.backends.system import libraries
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.geometry.mesh import TetMesh, TriMesh
 from geounfold.mapping.control_mesh import ControlMesh
-from geounfold.report.plots import rendering, style
+from geounfold.report.plots import style
 from geounfold.report.plots.bodies import (
     _tet_faces,
     draw_bodies,
@@ -21,7 +22,7 @@ from geounfold.report.plots.bodies import (
     draw_surface,
 )
 from geounfold.report.plots.figures import draw_curves, draw_distribution, png
-from geounfold.report.plots.rendering import block_sides, check_rendering, render_body
+from geounfold.report.plots.rendering import _seen, block_sides, check_rendering, render_body
 from geounfold.report.plots.style import ViewOptions
 from tests.shapes import CUBE, SIX, grid_cells
 
@@ -56,7 +57,7 @@ def test_sides_of_blocks_on_a_lattice_and_off_it():
 
 def test_blocks_behind_others_are_left_out_and_no_others():
     cube = grid_cells(9, 9, 9) * 1.0
-    seen = rendering._seen(cube, np.ones(3), np.array([1.0, 1.0, 1.0]))
+    seen = _seen(cube, np.ones(3), np.array([1.0, 1.0, 1.0]))
     assert not seen[(cube < 7).all(axis=1)].any()
     assert seen[(cube >= 7).any(axis=1)].all()
     assert seen[(cube == 8).any(axis=1)].all()
@@ -182,7 +183,7 @@ def test_a_trial_that_dies_is_told_apart_from_a_missing_library(monkeypatch, loa
     pytest.importorskip("pyvista")
     died = SimpleNamespace(returncode=-11)
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: died)
-    monkeypatch.setattr(rendering, "_loads", loads)
+    monkeypatch.setattr(libraries, "_loads", loads)
     with pytest.raises(MissingDependencyError, match=message):
         check_rendering.__wrapped__()
 

@@ -10,11 +10,16 @@ from contextlib import contextmanager
 from types import FrameType
 
 STOPS = {
-    signal.SIGINT: "interrupted",
-    signal.SIGTERM: "terminated",
-    signal.SIGHUP: "hung up",
+    signal.Signals[name]: word
+    for name, word in (
+        ("SIGINT", "interrupted"),
+        ("SIGTERM", "terminated"),
+        ("SIGHUP", "hung up"),  # not on Windows
+        ("SIGBREAK", "interrupted"),  # Windows alone: Ctrl-Break, or the console is closed
+    )
+    if hasattr(signal, name)
 }
-"""What each signal does to a run."""
+"""What each signal does to a run, of those that the system has."""
 
 
 class StoppedError(KeyboardInterrupt):

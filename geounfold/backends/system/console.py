@@ -1,0 +1,43 @@
+"""The console: characters that it cannot show, and lines that are drawn over."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import os
+import sys
+from typing import Any, TextIO
+
+_ESCAPES = 4  # ENABLE_VIRTUAL_TERMINAL_PROCESSING of consoleapi.h
+_HANDLE = {1: -11, 2: -12}  # GetStdHandle's numbers of stdout and stderr
+
+
+def speak_to_any_console() -> None:
+    """Write a character that the console's encoding lacks as an escape, instead of failing.
+
+    On Windows a pipe or a file gets text in the language's old code page, cp1252 for English.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
+
+
+def redraws(stream: TextIO) -> bool:
+    """Return whether a terminal takes escapes that clear a line; switch them on if it can."""
+    terminal = os.environ.get("TERM", "").lower()
+    if not terminal and hasattr(ctypes, "WinDLL"):  # Windows names none
+        return _switches_on(stream)
+    return terminal not in ("", "dumb", "unknown")
+
+
+def _switches_on(stream: TextIO) -> bool:
+    """Switch escapes on in a console of Windows 10 or later; return whether it takes them."""
+    kernel: Any = ctypes.WinDLL("kernel32")  # type: ignore[attr-defined,unused-ignore]
+    kernel.GetStdHandle.restype = ctypes.c_void_p
+    kernel.GetConsoleMode.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    kernel.SetConsoleMode.argtypes = [ctypes.c_void_p, ctypes.c_uint32]
+    mode = ctypes.c_uint32()
+    handle = kernel.GetStdHandle(_HANDLE[2 if stream is sys.stderr else 1])
+    if not kernel.GetConsoleMode(handle, ctypes.byref(mode)):
+        return False
+    return bool(kernel.SetConsoleMode(handle, mode.value | _ESCAPES))

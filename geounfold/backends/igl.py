@@ -95,6 +95,12 @@ def face_components(F: Ints) -> Ints:
     return np.asarray(component, dtype=np.int64).ravel()
 
 
+def oriented_alike(F: Ints) -> Ints:
+    """Return triangles (m, 3) wound alike within each connected component, where they can be."""
+    out = igl.bfs_orient(_i(F))
+    return np.asarray(out[0] if isinstance(out, tuple) else out, dtype=np.int64)
+
+
 def boundary_loops(F: Ints) -> list[Ints]:
     """Return the border loops of a triangle mesh, the one of most vertices first."""
     loops = [np.asarray(loop, dtype=np.int64) for loop in igl.boundary_loop_all(_i(F))]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geounfold.body.check import check_points
+from geounfold.body.fault_surface import FaultWalls
 from geounfold.body.lattice import Lattice, distinct, measure_lattice
 from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending.mend import WORDS, Mended
@@ -73,15 +75,41 @@ class BodyPoints:
         The blocks as given, which the map must contain.
     mended : MendingRecord or None
         What was mended of this body; None without a lattice.
+    walls : FaultWalls or None
+        The faults and limits at which the body was cut off; None if no cut is known.
     """
 
     fitted: Floats
     blocks: Floats
     mended: MendingRecord | None = None
+    walls: FaultWalls | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The cells of a run's points, before they are divided into bodies.
+
+    Attributes
+    ----------
+    work : (m, 3) float
+        Cells, working units: the points, and sub-blocks filled.
+    home : (n,) int
+        Cell of each point.
+    frame : Frame
+        The working frame.
+    """
+
+    work: Floats
+    home: Ints
+    frame: Frame
 
 
 def prepare(
-    points: Floats, body: int | str | None = None, *, parts: bool = False
+    points: Floats,
+    body: int | str | None = None,
+    *,
+    parts: bool = False,
+    cut: Callable[[Cells], Ints] | None = None,
 ) -> tuple[PreparedPoints, list[BodyPoints]]:
     """Return the prepared points of the run, and those of each body.
 
@@ -93,6 +121,9 @@ def prepare(
         The choice among separate bodies, as `select_body` takes it.
     parts : bool
         Whether bodies of several sheets are divided into these.
+    cut : callable, optional
+        Returns the body of each cell, from 0 without gaps, -1 for cells to leave out: fault blocks
+        in place of the separate bodies. All are chosen.
 
     Raises
     ------
@@ -106,12 +137,15 @@ def prepare(
     filled, lattice = (points, lattice) if cells is None else (cells.points, cells.lattice)
     frame = _frame(points, filled, lattice)
     work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))
-    labels = separate_bodies(work, frame)
-    own = labels if cells is None else labels[cells.home]
-    groups = select_body(points, own, body)
+    home = np.arange(len(points)) if cells is None else cells.home
+    labels = separate_bodies(work, frame) if cut is None else cut(Cells(work, home, frame))
+    own = labels if cells is None else labels[home]
+    if cut is None:
+        groups = select_body(points, own, body)
+    else:
+        groups = tuple(np.flatnonzero(own == k) for k in range(int(own.max()) + 1))
     given = frame.to_work(points)
     record = MendingRecord(np.zeros(len(points), np.int64))
-    home = np.arange(len(points)) if cells is None else cells.home
     bodies = []
     for group in groups:
         rows = np.flatnonzero(labels == own[group[0]])

@@ -274,13 +274,19 @@ class Certificate(Mapping[str, Any]):
 
 
 def certify_parts(
-    control: ControlMesh, shell: ControlMesh | None, held: Ints, vertex_part: Ints
+    control: ControlMesh,
+    shell: ControlMesh | None,
+    held: Ints,
+    vertex_part: Ints,
+    *,
+    apart: bool = True,
 ) -> Certificate:
     """Return the certificate of a map whose control meshes touch in the folded space.
 
     Each part is proved by itself, on the numbers that carry its points. The flat images of the
     parts must lie apart along x, which makes the map of all points one-to-one: no two parts have
-    an image in common, and a point belongs to one part.
+    an image in common, and a point belongs to one part. Fault blocks, which share one flat space,
+    are proved one by one; how far their images overlap is measured.
 
     Parameters
     ----------
@@ -288,6 +294,8 @@ def certify_parts(
         As `certify` takes them, of all parts as one.
     vertex_part : (n,) int
         Part of each vertex.
+    apart : bool
+        Whether the parts must lie apart; False for fault blocks.
     """
     whole, count = control if shell is None else shell, len(control.folded.T)
     found, elements, reaches = [], [], []
@@ -307,7 +315,7 @@ def certify_parts(
         x = whole.unfolded.V[own, 0]
         reaches.append((float(x.min()), float(x.max())))
     reaches.sort()
-    overlaps = sum(a[1] >= b[0] for a, b in pairwise(reaches))
+    overlaps = sum(a[1] >= b[0] for a, b in pairwise(reaches)) if apart else 0
     sums = {name: sum(getattr(c, name) for c in found) for name in _COUNTS}
     sums["crossing_unfolded"] += overlaps
     return Certificate(

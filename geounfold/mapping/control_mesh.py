@@ -99,7 +99,7 @@ class Datum:
 
 
 def side_by_side(
-    parts: Sequence[tuple[ControlMesh, ControlMesh | None]], gap: float = 10.0
+    parts: Sequence[tuple[ControlMesh, ControlMesh | None]], gap: float = 10.0, apart: bool = True
 ) -> tuple[ControlMesh, ControlMesh | None]:
     """Return several control meshes, with their shells, as one: side by side along unfolded x.
 
@@ -109,6 +109,8 @@ def side_by_side(
         Control meshes with their shells. A shell's first vertices are the control mesh's.
     gap : float
         Distance between the meshes, in working units.
+    apart : bool
+        False if their flat places are those of one space, and are kept.
     """
     if len(parts) == 1:
         return parts[0]
@@ -121,7 +123,7 @@ def side_by_side(
     for k, (control, shell) in enumerate(parts):
         whole, n = wholes[k], inner[k]
         V = whole.unfolded.V
-        moved = V + np.array([edge - float(V[:, 0].min()), 0.0, 0.0])
+        moved = V + np.array([edge - float(V[:, 0].min()), 0.0, 0.0]) if apart else V
         edge += float(np.ptp(V[:, 0])) + gap
         columns.append(np.column_stack([whole.folded.V, moved, whole.stratigraphic]))
         number = np.arange(len(V)) + np.where(np.arange(len(V)) < n, starts[k], further[k] - n)

@@ -32,11 +32,12 @@ from geounfold.backends.system import files
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 OLDEST = 2
 """Oldest version that can be read."""
 
-_UNDIVIDED = 3  # version written for bodies that are not divided into sheet parts
+_UNDIVIDED = 3  # version written for bodies that are not divided into parts
+_UNFAULTED = 4  # version written for bodies divided into sheets, not into fault blocks
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -104,6 +105,12 @@ ARRAYS: Mapping[str, Layout] = {
     "vertex_part": Layout(_INDEX, ("parted?",), below="vertices"),
     "part_cells": Layout(_INDEX, ("cells?", 3)),
     "cell_part": Layout(_INDEX, ("cells?",), below="vertices"),
+    "fault_points": Layout(_FLOAT, ("faulted?", 3)),
+    "fault_block": Layout(_INDEX, ("faulted?",), below="vertices"),
+    "fault_side": Layout(_FLOAT, (), holds=lambda a: bool(a >= 0), must="not be negative"),
+    "fault_vertices": Layout(_FLOAT, ("corners?", 3)),
+    "fault_triangles": Layout(_INDEX, ("triangles?", 3), below="corners?"),
+    "fault_surface": Layout(_INDEX, ("triangles?",), below="triangles?"),
 }
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
 
@@ -112,6 +119,12 @@ ADDED: Mapping[str, tuple[int, Any]] = {
     "vertex_part": (4, np.zeros(0)),
     "part_cells": (4, np.zeros((0, 3))),
     "cell_part": (4, np.zeros(0)),
+    "fault_points": (5, np.zeros((0, 3))),
+    "fault_block": (5, np.zeros(0)),
+    "fault_side": (5, 0),
+    "fault_vertices": (5, np.zeros((0, 3))),
+    "fault_triangles": (5, np.zeros((0, 3))),
+    "fault_surface": (5, np.zeros(0)),
 }
 """Arrays added later: the first version that has each, and its value in older files."""
 
@@ -147,8 +160,8 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
     path : path or binary stream
         Destination.
     arrays : dict of arrays
-        The arrays of ARRAYS, of any type that converts without loss; without those on parts for
-        bodies that are not divided, whose file is of the version before.
+        The arrays of ARRAYS, of any type that converts without loss; without those on parts or
+        faults for bodies that have none, whose file is of an earlier version.
 
     Raises
     ------
@@ -160,7 +173,9 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
         for name, layout in ARRAYS.items()
         if name in arrays
     }
-    version = FORMAT_VERSION if "vertex_part" in arrays else _UNDIVIDED
+    version = _UNFAULTED if "vertex_part" in arrays else _UNDIVIDED
+    if "fault_points" in arrays:
+        version = FORMAT_VERSION
     late = {n for n, (first, _) in ADDED.items() if first > version}
     _check_names({*arrays}, {*ARRAYS} - late, "the map")
     _check_arrays({**exact, **_left_out(late)}, "the map")

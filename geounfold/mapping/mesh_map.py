@@ -12,15 +12,17 @@ import numpy as np
 
 from geounfold.backends.igl import TetIndex, barycentric_in_tets
 from geounfold.backends.threads import over_slices, slices
+from geounfold.body.fault_cells import FaultCells
 from geounfold.body.working_frame import Frame
-from geounfold.errors import check_one_of
+from geounfold.errors import InputError, check_one_of
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers, TetMesh
 from geounfold.mapping.carried import Carried, Returned, checked_points
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients
+from geounfold.mapping.fault_space import JoinedSpace
 from geounfold.mapping.map_file import read_arrays, write_arrays
 from geounfold.mapping.mesh_space import MeshImage, MeshSpace
-from geounfold.mapping.parts_space import MapParts, PartsSpace
+from geounfold.mapping.parts_space import MapParts, PartsSpace, part_elements, part_spaces
 from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
 
 REACH = 3.0
@@ -93,8 +95,11 @@ class UnfoldingMap:
         return MeshSpace(self.control.folded, shell, self.reach, self._known)
 
     @cached_property
-    def _unfolded(self) -> MeshSpace:
+    def _unfolded(self) -> MeshSpace | JoinedSpace:
         shell = None if self.shell is None else self.shell.unfolded
+        if self.parts is not None and isinstance(self.parts.cells, FaultCells):
+            spaces = part_spaces(self.control.unfolded, shell, self.reach, self.parts)
+            return JoinedSpace(spaces, self.whole.folded, self.parts.cells)
         return MeshSpace(self.control.unfolded, shell, self.reach, self._known)
 
     @cached_property
@@ -206,6 +211,73 @@ class UnfoldingMap:
             unsolved += len(lost)
         return unsolved
 
+    def carry_by_block(
+        self, points: Floats, fault_block: Ints | None, *, inverse: bool = False
+    ) -> Carried:
+        """Carry points by the fault block that each belongs to; by its place if none is given.
+
+        Flat places at a cut-off may lie in two fault blocks, so that only the number tells which
+        of two folded places is meant.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            As `carry` takes them.
+        fault_block : (n,) int or None
+            Fault block of each point; -1 leaves the choice to the map.
+        inverse : bool
+            As `carry` takes it.
+
+        Raises
+        ------
+        InputError
+            There is no fault block of a number.
+        """
+        if fault_block is None:
+            return self.carry(points, inverse=inverse)
+        block = np.asarray(fault_block, dtype=np.int64)
+        if block.shape != (len(points),):
+            raise InputError(
+                f"fault_block must have one number per point, ({len(points)},), but has "
+                f"{block.shape}"
+            )
+        most = -1 if self.parts is None else self.parts.count - 1
+        if block.max(initial=-1) > most or block.min(initial=-1) < -1:
+            raise InputError(
+                f"fault_block must be -1 to {most}, but reaches {block.min()} to {block.max()}"
+            )
+        out = self.carry(points, inverse=inverse)
+        for k in range(most + 1):
+            rows = np.flatnonzero(block == k)
+            if not len(rows):
+                continue
+            own, elements = self._of_part(k)
+            found = own.carry(points[rows], inverse=inverse)
+            for name in ("points", "stratigraphic", "inside", "placed", "distance"):
+                getattr(out, name)[rows] = getattr(found, name)
+            out.element[rows] = np.where(
+                found.element >= 0, elements[np.maximum(found.element, 0)], -1
+            )
+        return out
+
+    def _of_part(self, part: int) -> tuple[UnfoldingMap, Ints]:
+        """Return the map of one part by itself, and its elements' numbers among those of all."""
+        if self.parts is None:
+            raise TypeError("the map has no parts")
+        core, rest, number = part_elements(
+            self.control.folded, None if self.shell is None else self.shell.folded, self.parts, part
+        )
+        own = self.parts.vertex == part
+        count = len(self.control.folded.V)
+        control = _some(self.control, own[:count], number[self.control.folded.T[core]])
+        shell = None
+        if self.shell is not None and len(rest):
+            shell = _some(self.shell, own, number[self.shell.folded.T[rest]])
+        elements = np.concatenate([core, len(self.control.folded.T) + rest])
+        return UnfoldingMap(
+            self.frame, control, shell, self.reach, coordinates=self.coordinates
+        ), elements
+
     def returned(self, points: Floats, carried: Carried) -> Returned:
         """Return the round trip of points from their images.
 
@@ -270,13 +342,19 @@ class UnfoldingMap:
             out[rows] = self.prisms.gradients(work[rows], element[rows])
         return out
 
-    def to_flat(self, points: Floats) -> Floats:
+    def to_flat(self, points: Floats, fault_block: Ints | None = None) -> Floats:
         """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
-        return self.carry(points).points
+        return self.carry_by_block(points, fault_block).points
 
-    def to_folded(self, points: Floats) -> Floats:
+    def to_folded(self, points: Floats, fault_block: Ints | None = None) -> Floats:
         """Return flat points (n, 3) in the folded space, the data's; NaN beyond the reach."""
-        return self.carry(points, inverse=True).points
+        return self.carry_by_block(points, fault_block, inverse=True).points
+
+    def block_of(self, points: Floats) -> Ints | None:
+        """Return the fault block that folded points (n, 3) belong to; None without faults."""
+        if self.parts is None or not isinstance(self.parts.cells, FaultCells):
+            return None
+        return self.parts.cells.of(self.frame.to_work(points))
 
     def save(self, path: str | Path | BinaryIO) -> None:
         """Write the map as .npz without pickles: control mesh, frame, version, checksum."""
@@ -304,6 +382,15 @@ class UnfoldingMap:
             "stratigraphic": whole.stratigraphic,
             **({} if self.parts is None else self.parts.arrays()),
         }
+
+
+def _some(mesh: ControlMesh, vertices: Bools, T: Ints) -> ControlMesh:
+    """Return tetrahedra of some vertices of a control mesh, numbered among these."""
+    return ControlMesh(
+        TetMesh(mesh.folded.V[vertices], T),
+        TetMesh(mesh.unfolded.V[vertices], T),
+        mesh.stratigraphic[vertices],
+    )
 
 
 def load(path: str | Path) -> UnfoldingMap:

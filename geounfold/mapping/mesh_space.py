@@ -89,6 +89,13 @@ class MeshSpace:
         self._T = mesh.T if shell is None else np.concatenate([mesh.T, shell.T])
         self._touching = TOUCHING * float(np.ptp(mesh.V, axis=0).max())
 
+    def may_hold(self, points: Floats) -> Bools:
+        """Return which points (n, 3) are near enough to lie in the space, (n,)."""
+        margin = self._reach if self._shell is None else self._touching
+        low, high = self._V.min(axis=0) - margin, self._V.max(axis=0) + margin
+        out: Bools = np.logical_and(points >= low, points <= high).all(axis=1)
+        return out
+
     @cached_property
     def walk(self) -> TetWalk:
         """The index that locates nearly all points of the control mesh."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geounfold.body.fault_cells import FaultCells
+from geounfold.body.fault_surface import FaultSurface
 from geounfold.body.parts.division import PartCells
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Floats, Ints, Numbers, TetMesh
@@ -24,12 +26,13 @@ class MapParts:
     ----------
     vertex : (n,) int
         Part of each vertex of the control mesh and its shell.
-    cells : PartCells
-        What gives a folded point its part.
+    cells : PartCells or FaultCells
+        What gives a folded point its part; FaultCells if the parts are fault blocks, which share
+        one flat space.
     """
 
     vertex: Ints
-    cells: PartCells
+    cells: PartCells | FaultCells
 
     @property
     def count(self) -> int:
@@ -38,6 +41,8 @@ class MapParts:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the parts as the arrays of a map file."""
+        if isinstance(self.cells, FaultCells):
+            return {"vertex_part": self.vertex, **_NO_CELLS, **_fault_arrays(self.cells)}
         return {
             "vertex_part": self.vertex,
             "part_cells": self.cells.cells,
@@ -58,9 +63,76 @@ class MapParts:
         vertex, cells, part = (
             arrays[name].astype(np.int64) for name in ("vertex_part", "part_cells", "cell_part")
         )
+        if len(arrays["fault_points"]):
+            if len(vertex) != len(arrays["folded"]):
+                raise InputError("the map's fault blocks do not fit its mesh; save it again")
+            return cls(vertex, _fault_cells(arrays))
         if steps is None or len(vertex) != len(arrays["folded"]) or not len(cells):
             raise InputError("the map's parts do not fit its control mesh; save it again")
         return cls(vertex, PartCells(cells, part, steps))
+
+
+_NO_CELLS = {"part_cells": np.zeros((0, 3), np.int64), "cell_part": np.zeros(0, np.int64)}
+"""Arrays of bodies divided into sheets, which those divided by faults do not have."""
+
+
+def _fault_arrays(cells: FaultCells) -> dict[str, np.ndarray]:
+    """Return fault blocks and faults as the arrays of a map file."""
+    surfaces = cells.surfaces
+    first = np.cumsum([0, *(len(s.V) for s in surfaces)])
+    return {
+        "fault_points": cells.points,
+        "fault_block": cells.part,
+        "fault_side": np.array(cells.side),
+        "fault_vertices": np.concatenate([np.zeros((0, 3)), *(s.V for s in surfaces)]),
+        "fault_triangles": np.concatenate(
+            [np.zeros((0, 3), np.int64), *(s.F + n for s, n in zip(surfaces, first, strict=False))]
+        ),
+        "fault_surface": np.repeat(np.arange(len(surfaces)), [len(s.F) for s in surfaces]),
+    }
+
+
+def _fault_cells(arrays: Mapping[str, np.ndarray]) -> FaultCells:
+    """Return fault blocks and faults from the arrays of a map file; faults are numbered."""
+    V, F = arrays["fault_vertices"], arrays["fault_triangles"].astype(np.int64)
+    number = arrays["fault_surface"].astype(np.int64)
+    surfaces = []
+    for k in range(int(number.max(initial=-1)) + 1):
+        used, own = np.unique(F[number == k], return_inverse=True)
+        surfaces.append(FaultSurface(str(k), V[used], own.reshape(-1, 3)))
+    part = arrays["fault_block"].astype(np.int64)
+    return FaultCells(arrays["fault_points"], part, tuple(surfaces), float(arrays["fault_side"]))
+
+
+def part_elements(
+    mesh: TetMesh, shell: TetMesh | None, parts: MapParts, part: int
+) -> tuple[Ints, Ints, Ints]:
+    """Return the elements of a part in mesh and shell, and its vertices' numbers among its own."""
+    own = parts.vertex == part
+    core = np.flatnonzero(own[mesh.T[:, 0]])
+    rest = np.zeros(0, np.int64) if shell is None else np.flatnonzero(own[shell.T[:, 0]])
+    return core, rest, np.cumsum(own) - 1
+
+
+def part_spaces(
+    mesh: TetMesh, shell: TetMesh | None, reach: float, parts: MapParts
+) -> tuple[tuple[MeshSpace, Ints], ...]:
+    """Return for each part its space, and the numbers of its elements among those of all.
+
+    Parameters as `PartsSpace` takes them.
+    """
+    spaces: list[tuple[MeshSpace, Ints]] = []
+    whole = mesh if shell is None else shell
+    for part in range(parts.count):
+        own = parts.vertex == part
+        core, rest, number = part_elements(mesh, shell, parts, part)
+        inner = TetMesh(mesh.V[own[: len(mesh.V)]], number[mesh.T[core]])
+        outer = None
+        if shell is not None and len(rest):
+            outer = TetMesh(whole.V[own], number[shell.T[rest]])
+        elements = np.concatenate([core, len(mesh.T) + rest])
+        spaces.append((MeshSpace(inner, outer, reach, ()), elements))
+    return tuple(spaces)
 
 
 class PartsSpace:
@@ -80,19 +152,7 @@ class PartsSpace:
 
     def __init__(self, mesh: TetMesh, shell: TetMesh | None, reach: float, parts: MapParts) -> None:
         self._cells = parts.cells
-        self._spaces: list[tuple[MeshSpace, Ints]] = []
-        whole = mesh if shell is None else shell
-        for part in range(parts.count):
-            own = parts.vertex == part
-            number = np.cumsum(own) - 1
-            core = np.flatnonzero(own[mesh.T[:, 0]])
-            inner = TetMesh(mesh.V[own[: len(mesh.V)]], number[mesh.T[core]])
-            outer, rest = None, np.zeros(0, np.int64)
-            if shell is not None:
-                rest = np.flatnonzero(own[shell.T[:, 0]])
-                outer = TetMesh(whole.V[own], number[shell.T[rest]]) if len(rest) else None
-            elements = np.concatenate([core, len(mesh.T) + rest])
-            self._spaces.append((MeshSpace(inner, outer, reach, ()), elements))
+        self._spaces = part_spaces(mesh, shell, reach, parts)
 
     def walked(self, x: Floats, y: Floats, z: Floats) -> tuple[Numbers | Ints, Floats]:
         """Return what MeshSpace returns."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from geounfold.body.fault_surface import FaultWalls
 from geounfold.body.merged_blocks import MergedBlocks
 from geounfold.body.working_frame import Frame
 from geounfold.flattening import Flattening, flatten
@@ -63,6 +64,8 @@ class PreparedBody:
         Times and names a stage: ``with stage("hull"):``.
     coarse : MergedBlocks or None
         The points merged into cells, if there are many; hull and split are then in cells.
+    walls : FaultWalls or None
+        The faults and limits at which the body was cut off; None if no cut is known.
     """
 
     points: Floats
@@ -79,6 +82,7 @@ class PreparedBody:
     sheet_options: SheetOptions
     stage: Stage
     coarse: MergedBlocks | None = None
+    walls: FaultWalls | None = None
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
         """Return a surface flattened by the chosen flattener; nothing is repaired."""

@@ -33,6 +33,22 @@ def check_method(options: UnfoldOptions) -> None:
     )
 
 
+def check_faulted(options: UnfoldOptions, *, given: bool) -> None:
+    """Raise OptionError if a method or surfaces are chosen that cannot take faults out.
+
+    Parameters
+    ----------
+    options : UnfoldOptions
+        Of the run.
+    given : bool
+        Whether top and bottom are given.
+    """
+    if given:
+        raise OptionError("top and bottom are of a body without faults: leave out one or the other")
+    if not METHODS[options.method].control:
+        raise OptionError(no_mesh(options.method, "faults are taken out of control meshes only"))
+
+
 def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
     """Raise OptionError if a method without a control mesh is to unfold several bodies."""
     if len(groups) > 1 and not METHODS[options.method].control:

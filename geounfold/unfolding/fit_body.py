@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from geounfold.body.fault_surface import FaultWalls
 from geounfold.body.merged_blocks import merge_blocks, merge_sizes
 from geounfold.body.prepare import BodyPoints
 from geounfold.body.scattered import scattered
@@ -14,6 +17,7 @@ from geounfold.errors import (
     NoSheetError,
     SplitError,
 )
+from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.methods import METHODS, BodyFit, PreparedBody, SurfacePair
 from geounfold.methods.contract import Stage, mean_top_normal
@@ -110,6 +114,8 @@ def _fit_at(
             hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
         with stage("split"):
             parts = split(hull.mesh, options.split)
+            if body.walls is not None:
+                parts = _walled(parts, body.walls.scaled(1 / merge))
     else:
         with stage("split"):
             parts = split_reference(*reference)
@@ -130,9 +136,16 @@ def _fit_at(
         sheet_options=options.sheet_options,
         stage=stage,
         coarse=coarse,
+        walls=body.walls if reference is None else None,
     )
     result = method.fit(prepared)
     return turned_over(result) if over else result
+
+
+def _walled(parts: SurfaceSplit, walls: FaultWalls) -> SurfaceSplit:
+    """Return a split with the faces at walls as rim."""
+    V, F = parts.mesh.V, parts.mesh.F
+    return replace(parts, rim=parts.rim | walls.at_faces(V[F].mean(axis=1), face_normals(V, F)))
 
 
 def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geounfold.body.fault_cells import FaultCells
 from geounfold.body.prepare import PreparedPoints
 from geounfold.body.working_frame import Frame
 from geounfold.geometry.mesh import Floats, Ints
@@ -113,6 +114,8 @@ def _trust(
     frame = prepared.frame
     signs = [fit.signs or _signs_of(fit, mapping, frame) for fit in fits]
     kind = "body" if prepared.division is None else "part"
+    if mapping.parts is not None and isinstance(mapping.parts.cells, FaultCells):
+        kind = "fault block"
     names = [f"{kind} {number}" for number in range(len(fits))] if len(fits) > 1 else [""]
     return judge(signs, names, frame, prepared.points, carried.stratigraphic)
 
@@ -152,7 +155,8 @@ def _certificate(
     control, shell, held = mapping.control, mapping.shell, carried.element
     if mapping.parts is None:
         return _in_data(certify(control, shell, held), frame)
-    return _in_data(certify_parts(control, shell, held, mapping.parts.vertex), frame)
+    apart = not isinstance(mapping.parts.cells, FaultCells)
+    return _in_data(certify_parts(control, shell, held, mapping.parts.vertex, apart=apart), frame)
 
 
 def _quality(

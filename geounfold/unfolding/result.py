@@ -113,6 +113,32 @@ class Unfolding:
             out[rows] = part
         return out
 
+    @cached_property
+    def fault_block(self) -> Ints:
+        """Fault block of every point, (n,), 0 the largest; -1 outside the body.
+
+        A body without faults is one fault block.
+        """
+        out = np.full(len(self.folded), -1)
+        for block, rows in enumerate(self._record.prepared.groups):
+            out[rows] = block if self._record.faulted is not None else 0
+        return out
+
+    @cached_property
+    def faults(self) -> pd.DataFrame:
+        """A row per fault and pair of fault blocks: throw, heave, strike slip, rake, gaps.
+
+        Lengths are in the data's unit, angles in degrees; empty for bodies without faults.
+        """
+        found = self._record.faulted
+        return pd.DataFrame() if found is None else found.table
+
+    @property
+    def slips(self) -> pd.DataFrame:
+        """A row per slip vector: places on both walls of a fault that meet in the flat space."""
+        found = self._record.faulted
+        return pd.DataFrame() if found is None else found.slips()
+
     @property
     def junctions(self) -> tuple[Junction, ...]:
         """Places where sheet parts meet, in the data's coordinates; empty for whole bodies."""
@@ -139,26 +165,48 @@ class Unfolding:
         Index, columns, their order and types are as given; a column called as a result is
         replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
         stratigraphic, location, mesh_distance, those of ``columns`` and, if a body has several
-        sheets, body_part. Rows that were not chosen have empty results and the location
+        sheets, body_part; if faults were taken out, fault_block. Rows that were not chosen have empty results and the location
         ``not selected``.
         """
         given = self._given
         if given is None:
             given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
         parts = {"body_part": self.body_part} if self.junctions else {}
+        if self._record.faulted is not None:
+            parts["fault_block"] = self.fault_block
         found = {**result_columns(UNFOLDED, self.carried), **self.columns, **parts}
         if self.chosen is not None:
             rows = np.flatnonzero(self.chosen)
             found = spread_columns([(rows, found)], np.where(self.chosen, 0, -1))
         return given.assign(**found)
 
-    def to_flat(self, points: Floats) -> Floats:
-        """Return other folded points (m, 3) in the flat space."""
-        return self.map.to_flat(points)
+    def to_flat(self, points: Floats, fault_block: Ints | None = None) -> Floats:
+        """Return other folded points (m, 3) in the flat space.
 
-    def to_folded(self, points: Floats) -> Floats:
-        """Return points of the flat space (m, 3) in the folded one."""
-        return self.map.to_folded(points)
+        Parameters
+        ----------
+        points : (m, 3) float
+            In the data's coordinates.
+        fault_block : (m,) int, optional
+            Fault block of each, if faults were taken out; by the side of the faults if not given.
+        """
+        if fault_block is None or isinstance(self.map, PointwiseMap):
+            return self.map.to_flat(points)
+        return self.map.to_flat(points, fault_block)
+
+    def to_folded(self, points: Floats, fault_block: Ints | None = None) -> Floats:
+        """Return points of the flat space (m, 3) in the folded one.
+
+        Parameters
+        ----------
+        points : (m, 3) float
+            In the data's unit.
+        fault_block : (m,) int, optional
+            Fault block of each, which tells between the two walls of a cut-off.
+        """
+        if fault_block is None or isinstance(self.map, PointwiseMap):
+            return self.map.to_folded(points)
+        return self.map.to_folded(points, fault_block)
 
     @overload
     def transform(self, points: pd.DataFrame) -> pd.DataFrame: ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -16,6 +16,8 @@ from geounfold.body.parts.division import Division
 from geounfold.body.prepare import PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError
+from geounfold.faults.given import FaultsGiven, Surfaces, block_column
+from geounfold.faults.rejoin import Faulting
 from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
 from geounfold.io.selection import read_where
@@ -26,7 +28,8 @@ from geounfold.mapping.control_mesh import side_by_side, vertex_parts
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.parts_space import MapParts
 from geounfold.methods import METHODS, BodyFit, PointwiseMap
-from geounfold.unfolding.checks import check_method, check_single
+from geounfold.unfolding.checks import check_faulted, check_method, check_single
+from geounfold.unfolding.fit_blocks import fit_blocks
 from geounfold.unfolding.fit_body import fit
 from geounfold.unfolding.measured import measure
 from geounfold.unfolding.options import UnfoldOptions
@@ -56,12 +59,16 @@ class _Clock:
 
 
 @one_thread()
-def unfold(
+def unfold(  # the inputs on faults belong together, and to the points as top and bottom do
     points: Floats | pd.DataFrame,
     options: UnfoldOptions | None = None,
     *,
     top: TriMesh | tuple[Any, Any] | None = None,
     bottom: TriMesh | tuple[Any, Any] | None = None,
+    faults: Surfaces | None = None,
+    fault_blocks: Any | None = None,
+    slip_direction: Mapping[str, Any] | None = None,
+    outline: str = "ore",
     progress: Progress | None = None,
     where: str | None = None,
     **changes: Any,
@@ -78,6 +85,16 @@ def unfold(
     top, bottom : TriMesh or (V, F), optional
         Hanging wall and footwall in the points' coordinates, in place of an extracted hull;
         both or neither.
+    faults : mapping or sequence, optional
+        Fault surfaces as TriMesh, (V, F) or file, by name or in a sequence. The body is cut along
+        them into fault blocks; each is unfolded, and all are joined in one flat space.
+    fault_blocks : (n,) array or str, optional
+        Fault block of every point, numbers or texts; or the column of the DataFrame with them.
+    slip_direction : mapping, optional
+        (TREND, PLUNGE) of the slip in degrees, by the fault's name.
+    outline : str
+        ``ore`` if the rims are the ore's own, whose ends at a fault mark its slip; ``model`` if
+        the block model was cut off there.
     progress : callable, optional
         Called with every stage's name as it starts.
     where : str, optional
@@ -117,8 +134,15 @@ def unfold(
         points = given.loc[rows]
     clock = _Clock(progress)
     with clock.stage("frame"):
+        place = _coordinates(points)
+        blocks = block_column(fault_blocks, given, rows)
+        found = FaultsGiven.of(faults, blocks, slip_direction, outline, len(place))
+    if found is not None:
+        check_faulted(chosen, given=top is not None or bottom is not None)
+        return Unfolding(_faulted(place, Faulting(found), chosen, clock), given, rows)
+    with clock.stage("frame"):
         divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
-        prepared, bodies = prepare(_coordinates(points), chosen.body, parts=divide)
+        prepared, bodies = prepare(place, chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
     reference = _reference(top, bottom, prepared.frame)
     fits = []
@@ -131,6 +155,29 @@ def unfold(
     measured = measure(mapping, prepared, fits, chosen, clock.stage)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
     return Unfolding(record, given, rows)
+
+
+def _faulted(
+    points: Floats, faulting: Faulting, options: UnfoldOptions, clock: _Clock
+) -> RunRecord:
+    """Return the run of a body cut into fault blocks, which are unfolded and joined."""
+    with clock.stage("faults"):
+        prepared, bodies = prepare(points, cut=faulting.cut)
+        bodies = faulting.walled(bodies)
+    fits = fit_blocks(bodies, prepared.frame, options, clock.stage)
+    with clock.stage("joining"):
+        fits, found = faulting.join(fits, bodies, options.reach)
+    with clock.stage("map"):
+        meshes = [(f.control, f.shell) for f in fits if f.control is not None]
+        control, shell = side_by_side(meshes, apart=False)
+        parts = MapParts(vertex_parts(meshes), found.cells)
+        mapping = UnfoldingMap(
+            *(prepared.frame, control, shell, options.reach),
+            coordinates=options.coordinates,
+            parts=parts,
+        )
+    measured = measure(mapping, prepared, fits, options, clock.stage)
+    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found)
 
 
 @contextmanager

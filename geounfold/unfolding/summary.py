@@ -14,6 +14,7 @@ from geounfold.backends.system.memory import peak_memory_mb
 from geounfold.body.check import count_duplicates
 from geounfold.body.parts import Junction
 from geounfold.body.prepare import PreparedPoints
+from geounfold.faults.result import FaultedBody
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
 from geounfold.geometry.mesh import Floats, Ints
@@ -44,6 +45,8 @@ class RunRecord:
         Where the points went, what is proved of the map, how good it is.
     seconds : dict of float
         Per stage.
+    faulted : FaultedBody or None
+        What taking the faults out gave; None if there are none.
     """
 
     options: UnfoldOptions
@@ -52,6 +55,7 @@ class RunRecord:
     map: UnfoldingMap | PointwiseMap
     measured: Measured
     seconds: dict[str, float]
+    faulted: FaultedBody | None = None
 
     @property
     def outside(self) -> int:
@@ -105,9 +109,10 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "options": run.options.as_dict(),
         "config": to_toml(run.options),
         "points": len(run.prepared.points),
-        "bodies": run.prepared.bodies,
+        "bodies": run.prepared.bodies if run.faulted is None else len(set(run.faulted.groups)),
         "parts": _parts(run),
         "junctions": [_junction(j) for j in run.junctions],
+        **_faults(run),
         "lattice": _lattice(run),
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
@@ -147,6 +152,7 @@ def warnings_of(run: RunRecord) -> list[str]:
     if run.prepared.mended.changed:
         out.append(run.prepared.mended.sentence())
     out += [_told(junction) for junction in run.junctions]
+    out += [] if run.faulted is None else run.faulted.warnings()
     count, outside, empty = len(run.prepared.points), run.outside, run.empty
     if outside > empty:
         out.append(
@@ -211,6 +217,26 @@ def _parts(run: RunRecord) -> list[dict[str, Any]]:
         }
         for part, rows in enumerate(run.prepared.groups)
     ]
+
+
+def _faults(run: RunRecord) -> dict[str, Any]:
+    """Return the faults and fault blocks; nothing for bodies without faults."""
+    found = run.faulted
+    if found is None:
+        return {}
+    placed = run.measured.carried.placed
+    blocks = [
+        {
+            "fault_block": block,
+            "blocks": len(rows),
+            "joined_to": found.groups[block],
+            "turn": float(np.degrees(found.poses[block].angle)),
+            "shear": found.poses[block].shear.tolist(),
+            "empty": int((~placed[rows]).sum()),
+        }
+        for block, rows in enumerate(run.prepared.groups)
+    ]
+    return {"faults": found.rows(), "fault_blocks": blocks, "overlap_share": found.overlap}
 
 
 def _junction(junction: Junction) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from geounfold.body.working_frame import Frame
 from geounfold.errors import ControlMeshError, FlatteningError
-from geounfold.geometry.mesh import TriMesh
+from geounfold.geometry.mesh import Bools, TriMesh
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.methods.sheet.attempts import Trial
 from geounfold.methods.sheet.meshing.build import SheetMesh
@@ -79,7 +79,11 @@ Build = Callable[[Trial, float], tuple[FittedSheet, Horizons, SheetMesh]]
 
 
 def finish_in_turn(
-    trials: tuple[Trial, ...], build: Build, hull: TriMesh, frame: Frame, side: float
+    trials: tuple[Trial, ...],
+    build: Build,
+    hull: tuple[TriMesh, Bools | None],
+    frame: Frame,
+    side: float,
 ) -> tuple[Finish, tuple[Finish, ...]]:
     """Return the best finish, and all that were tried.
 
@@ -89,8 +93,8 @@ def finish_in_turn(
         The fits of the mid surface; the last one was taken, and is finished first.
     build : callable
         See `Build`.
-    hull : TriMesh
-        The body's hull, working units.
+    hull : (TriMesh, (m,) bool or None)
+        The body's hull, working units, and which of its faces are at fault walls.
     frame : Frame
         Working frame.
     side : float
@@ -115,7 +119,8 @@ def finish_in_turn(
             except (ControlMeshError, FlatteningError) as error:
                 failed.append(error)
                 break
-            signs = measure_signs(hull, UnfoldingMap(frame, *mesh.over_mid), side)
+            over = UnfoldingMap(frame, *mesh.over_mid)
+            signs = measure_signs(hull[0], over, side, walls=hull[1])
             found.append(Finish(trial, name, fitted, horizons, mesh, signs))
             if found[-1].good or not np.isfinite(mesh.lost):
                 break

@@ -7,7 +7,7 @@ import numpy as np
 from geounfold.errors import ControlMeshError, SplitError
 from geounfold.flattening import SpringOptions
 from geounfold.flattening import flatten as flatten_surface
-from geounfold.geometry.measures import vertex_sum
+from geounfold.geometry.measures import face_normals, vertex_sum
 from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.methods.contract import PreparedBody
 from geounfold.methods.sheet.attempts import Case, Trial, try_in_turn
@@ -67,9 +67,12 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
             return fitted, horizons, build_control(fitted, horizons, body.points, body.blocks, plan)
 
         hull = body.split.scaled(unit).mesh
+        walls = None
+        if body.walls is not None:
+            walls = body.walls.at_faces(hull.V[hull.F].mean(axis=1), face_normals(hull.V, hull.F))
         sides = body.frame.sides
         side = unit * (1.0 if sides is None else float(max(sides)))
-        best, finishes = finish_in_turn(trials, build, hull, body.frame, side)
+        best, finishes = finish_in_turn(trials, build, (hull, walls), body.frame, side)
         if unit > 1 and not best.mesh.sound:
             raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
         return SheetResult(medial, trials, best, finishes)
@@ -84,6 +87,10 @@ def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:
     samples = HullSamples(
         split.mesh.V, medial.normals, np.sign(side).astype(np.int64), variance, inset
     )
+    if body.walls is not None:
+        samples = samples.part(
+            ~body.walls.scaled(1 / unit).at_vertices(samples.points, samples.normals)
+        )
     return Case(
         medial=medial,
         samples=samples,
@@ -102,9 +109,14 @@ def _sites(body: PreparedBody) -> Sites | None:
     if steps is None:
         return None
     if coarse is None:
-        return surface_sites(np.rint(body.points / steps).astype(np.int64), steps)
-    near = np.rint(body.points[coarse.beside] / steps).astype(np.int64)
-    return surface_sites(near, steps, coarse.border[coarse.beside])
+        sites = surface_sites(np.rint(body.points / steps).astype(np.int64), steps)
+    else:
+        near = np.rint(body.points[coarse.beside] / steps).astype(np.int64)
+        sites = surface_sites(near, steps, coarse.border[coarse.beside])
+    if body.walls is None:
+        return sites
+    keep = sites.occupied | ~body.walls.past(sites.points)
+    return Sites(sites.points[keep], sites.occupied[keep])
 
 
 def _fitted(case: Case) -> tuple[Trial, ...]:

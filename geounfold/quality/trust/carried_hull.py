@@ -30,6 +30,8 @@ class CarriedHull:
         Thickness of the layer there: flat height over stratigraphic coordinate.
     lost : float
         Share of the hull's area that the map does not carry.
+    face : (m,) int
+        Number of each face in the hull.
     """
 
     folded: Floats
@@ -37,6 +39,7 @@ class CarriedHull:
     level: Floats
     thickness: Floats
     lost: float
+    face: Ints
 
     @cached_property
     def flat_normal(self) -> Floats:
@@ -115,6 +118,7 @@ def carry_hull(hull: TriMesh, mapping: UnfoldingMap) -> CarriedHull:
         level=carried.stratigraphic[F].mean(axis=1),
         thickness=thickness[F].mean(axis=1),
         lost=float(area[~there].sum() / area.sum()),
+        face=np.flatnonzero(there),
     )
 
 

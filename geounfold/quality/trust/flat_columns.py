@@ -31,6 +31,9 @@ class FlatColumns:
         Height of the body's uppermost and lowermost face; -inf and inf if there is none.
     depth : (r, c) float
         Distance from the outline inside the body, working units; 0 outside.
+    clear : (r, c) float
+        The same from the outline and from the columns of fault walls, in which the layers end on
+        a slant; equal to ``depth`` if there are none.
     """
 
     side: float
@@ -38,6 +41,7 @@ class FlatColumns:
     highest: Floats
     lowest: Floats
     depth: Floats
+    clear: Floats
 
     def of(self, places: Floats) -> tuple[Ints, Ints]:
         """Return the row and column number of flat places (k, 2 or 3)."""
@@ -47,11 +51,11 @@ class FlatColumns:
 
     def within(self, distance: float) -> Bools:
         """Return the columns that the body fills so far inside its outline, (r, c)."""
-        out: Bools = np.isfinite(self.highest) & (self.depth > max(distance, _RIM * self.side))
+        out: Bools = np.isfinite(self.highest) & (self.clear > max(distance, _RIM * self.side))
         return out
 
 
-def flat_columns(hull: CarriedHull, side: float) -> FlatColumns:
+def flat_columns(hull: CarriedHull, side: float, walls: Bools | None = None) -> FlatColumns:
     """Return the columns that the hull's faces cross; holes of one column are closed.
 
     Parameters
@@ -60,6 +64,8 @@ def flat_columns(hull: CarriedHull, side: float) -> FlatColumns:
         The body's hull in the flat space.
     side : float
         Side of a column, working units: a little more than a block, so that none is missed.
+    walls : (m,) bool, optional
+        Which of the hull's faces are at fault walls.
     """
     centre = hull.flat_centre
     low = centre[:, :2].min(axis=0)
@@ -71,5 +77,9 @@ def flat_columns(hull: CarriedHull, side: float) -> FlatColumns:
     np.minimum.at(lowest, at, centre[:, 2])
     there = np.isfinite(highest)
     there = ndimage.binary_fill_holes(there | ndimage.binary_closing(there))
-    depth = ndimage.distance_transform_edt(there) * side
-    return FlatColumns(side, low, highest, lowest, depth)
+    depth = clear = ndimage.distance_transform_edt(there) * side
+    if walls is not None:
+        walled = np.zeros(shape, bool)
+        walled[at[0][walls], at[1][walls]] = True
+        clear = ndimage.distance_transform_edt(there & ~ndimage.binary_closing(walled)) * side
+    return FlatColumns(side, low, highest, lowest, depth, clear)

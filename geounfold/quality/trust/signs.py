@@ -108,7 +108,12 @@ _NOTHING_CARRIED = Signs(1.0, 1.0, 1.0, np.nan, np.nan, np.nan, np.nan, 1.0, {})
 
 
 def measure_signs(
-    hull: TriMesh, mapping: UnfoldingMap, side: float, *, over_mid: bool = True
+    hull: TriMesh,
+    mapping: UnfoldingMap,
+    side: float,
+    *,
+    over_mid: bool = True,
+    walls: Bools | None = None,
 ) -> Signs:
     """Return the signs of one body.
 
@@ -122,14 +127,17 @@ def measure_signs(
         Longest side of a block, or of a cell of merged blocks, working units.
     over_mid : bool
         Whether the map's heights are those over the mid surface.
+    walls : (m,) bool, optional
+        Which of the hull's faces are at fault walls, and so are neither top nor bottom.
     """
     side = max(1.0, side)
     faces = carry_hull(hull, mapping)
     if not len(faces.level):
         return _NOTHING_CARRIED
-    columns = flat_columns(faces, _COLUMN * side)
-    ends, _ = _off(faces, columns, _OBLIQUE)
-    off, thickness = _off(faces, columns, _LEVEL)
+    own = None if walls is None else walls[faces.face]
+    columns = flat_columns(faces, _COLUMN * side, own)
+    ends, _ = _off(faces, columns, _OBLIQUE, own)
+    off, thickness = _off(faces, columns, _LEVEL, own)
     stretch, area = faces.stretch(ends.rows)
     length = _Share(ends.rows, stretch > _STRETCHED, area)
     within = columns.within(thickness / 2)
@@ -170,15 +178,19 @@ class _Share:
         return float(self.weight[self.bad].sum() / self.weight.sum()) if len(self.rows) else 1.0
 
 
-def _off(faces: CarriedHull, columns: FlatColumns, least: float) -> tuple[_Share, float]:
+def _off(
+    faces: CarriedHull, columns: FlatColumns, least: float, walls: Bools | None = None
+) -> tuple[_Share, float]:
     """Return the outermost faces that look up or down and which miss their level; thickness."""
     area, z = faces.flat_area, faces.flat_centre[:, 2]
     up, down = faces.up > least, faces.up < -least
+    if walls is not None:
+        up, down = up & ~walls, down & ~walls
     at = columns.of(faces.flat_centre)
     flat = up | down
     thickness = _median(faces.thickness[flat], area[flat])
     outer = (up & (z > columns.highest[at] - 1)) | (down & (z < columns.lowest[at] + 1))
-    depth = columns.depth[at]
+    depth = columns.clear[at]
     use = outer
     for distance in (max(_INSIDE, thickness / 2), _INSIDE):
         inside = outer & (depth > distance)

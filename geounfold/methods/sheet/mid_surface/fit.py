@@ -104,6 +104,12 @@ class HullSamples:
     variance: Floats
     inset: float
 
+    def part(self, keep: Bools) -> HullSamples:
+        """Return the samples of some vertices (n,)."""
+        return replace(
+            self, points=self.points[keep], normals=self.normals[keep], side=self.side[keep]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class FittedSheet:

@@ -95,12 +95,13 @@ class FaultCells:
         for tree, own in self._trees:  # on a fault's other side a fault block may be far
             far, row = nearest_points(tree, points, 1)
             found.append((far[:, None], own[row][:, None]))
-        distance, near = (np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        distance = np.concatenate([d for d, _ in found], axis=1)
+        near = np.concatenate([row for _, row in found], axis=1)
         parted = _PER_BLOCK * distance
-        for surface, (own, _) in zip(self.surfaces, self._sides, strict=True):
+        for surface, (sides, _) in zip(self.surfaces, self._sides, strict=True):
             seen = surface.sides(points)
             rows = np.flatnonzero(seen.distance < _REACH * self.side)
-            parted[rows] += own[near[rows]] != np.sign(seen.signed[rows])[:, None]
+            parted[rows] += sides[near[rows]] != np.sign(seen.signed[rows])[:, None]
         best = near[np.arange(len(points)), parted.argmin(axis=1)]
         out: Ints = self.part[best]
         return out

@@ -165,8 +165,8 @@ class Unfolding:
         Index, columns, their order and types are as given; a column called as a result is
         replaced in its place.  The results are unfolded_x, unfolded_y, unfolded_z,
         stratigraphic, location, mesh_distance, those of ``columns`` and, if a body has several
-        sheets, body_part; if faults were taken out, fault_block. Rows that were not chosen have empty results and the location
-        ``not selected``.
+        sheets, body_part; if faults were taken out, fault_block. Rows that were not chosen have
+        empty results and the location ``not selected``.
         """
         given = self._given
         if given is None:

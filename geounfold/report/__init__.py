@@ -4,11 +4,13 @@ Takes plain arrays and the dict of the summary, so that it can be written again 
 page loads nothing from elsewhere and follows the reader's light or dark setting.
 """
 
+from geounfold.report.faults import CarriedFaults
 from geounfold.report.page import report_html, write_report
 from geounfold.report.payload import CarriedHoles, CarriedPoints
 from geounfold.report.verdict import Verdict, verdict
 
 __all__ = [
+    "CarriedFaults",
     "CarriedHoles",
     "CarriedPoints",
     "Verdict",

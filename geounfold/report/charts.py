@@ -48,6 +48,36 @@ def distribution(values: Floats, label: str) -> str:
     return f'<div class="charts">{"".join(charts)}</div>'
 
 
+def dot_chart(
+    dots: tuple[Floats, Floats],
+    line: tuple[Floats, Floats],
+    labels: tuple[str, str],
+    words: tuple[str, str],
+) -> str:
+    """Return dots and a line over one axis as an SVG with a text alternative.
+
+    Parameters
+    ----------
+    dots, line : ((n,) float, (n,) float)
+        Places across and values; the line's places rise.
+    labels : (str, str)
+        Names of the axes, across and up.
+    words : (str, str)
+        Title of the chart, and its description.
+    """
+    x, y = dots
+    low, high = min(0.0, float(y.min())), max(0.0, float(y.max()))
+    room = 0.05 * (high - low) or 1.0
+    axes = _Axes((0.0, float(x.max()) or 1.0), (low - room, high + room))
+    points = "".join(
+        f'<circle class="faint" r="2" cx="{axes.px(a):.1f}" cy="{axes.py(b):.1f}"/>'
+        for a, b in zip(x.tolist(), y.tolist(), strict=True)
+    )
+    content = axes.frame(labels[0], labels[1], nice_ticks(low - room, high + room)) + points
+    content += f'<path class="line" d="M{axes.path(*line)}"/>'
+    return _svg(*words, content)
+
+
 def nice_ticks(low: float, high: float, most: int = 6) -> list[float]:
     """Return at most `most` round numbers from `low` to `high`, in steps of 1, 2 or 5.
 

@@ -46,6 +46,7 @@ MEANINGS = {
         "0 for a block inside; in the input's unit",
         "cividis",
     ),
+    "fault_block": ("fault block", "the block between faults that was unfolded by itself", ""),
     "location": ("location", "inside the control mesh, or extrapolated by the shell around it", ""),
     "nmd_folded": (
         "neighbour distance, folded",
@@ -59,6 +60,9 @@ MEANINGS = {
     ),
 }
 """Known columns: label, meaning, colour map."""
+
+_KINDS = ("fault_block",)
+"""Columns whose numbers are names of kinds, not amounts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,14 +186,19 @@ def _read(name: str, values: ArrayLike, group: str, known: str) -> Column | None
     group = known if known and name in MEANINGS else group
     series = pd.Series(np.asarray(values).ravel() if not isinstance(values, pd.Series) else values)
     numbers = _as_numbers(series)
-    if numbers is not None:
+    if numbers is not None and name not in _KINDS:
         return Column(name, label, meaning, group, colours or "viridis", numbers)
     texts = series.astype(object).where(series.notna(), "").astype(str).str.strip()
-    names = sorted(set(texts) - {""})
+    names = sorted(set(texts) - {""}, key=by_number)
     if len(names) > MOST_CATEGORIES or not names:
         return None
     codes = pd.Index(names).get_indexer(pd.Index(texts))
     return Column(name, label, meaning, group, "", codes.astype(np.int64), tuple(names))
+
+
+def by_number(name: str) -> tuple[float, str]:
+    """Order whole numbers by value, after all other texts."""
+    return (float(name), name) if name.isdigit() else (-1.0, name)
 
 
 def _as_numbers(series: pd.Series[Any]) -> Floats | None:

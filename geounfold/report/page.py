@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from string import Template
@@ -14,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from geounfold.geometry.mesh import Floats
 from geounfold.report.body import ReportBody, report_body
+from geounfold.report.faults import CarriedFaults, faults_section
 from geounfold.report.html_text import json_for_script, mapping, text
-from geounfold.report.payload import CarriedHoles, payload
+from geounfold.report.payload import CATEGORIES, CarriedHoles, payload
 from geounfold.report.pictures import pictures
 from geounfold.report.plots.rendering import check_rendering
 from geounfold.report.plots.style import ViewOptions
@@ -54,6 +56,7 @@ def write_report(
     columns: Mapping[str, ArrayLike],
     *,
     holes: CarriedHoles | None = None,
+    faults: CarriedFaults | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> None:
@@ -63,7 +66,7 @@ def write_report(
     ----------
     path : path
         The file to write; an existing one is replaced.
-    summary, folded, unfolded, columns, holes, exploration, view
+    summary, folded, unfolded, columns, holes, faults, exploration, view
         As for `report_html`.
 
     Raises
@@ -72,7 +75,11 @@ def write_report(
         As for `report_html`.
     """
     page = report_html(
-        summary, folded, unfolded, columns, holes=holes, exploration=exploration, view=view
+        *(summary, folded, unfolded, columns),
+        holes=holes,
+        faults=faults,
+        exploration=exploration,
+        view=view,
     )
     Path(path).write_text(page, encoding="utf-8")
 
@@ -84,6 +91,7 @@ def report_html(
     columns: Mapping[str, ArrayLike],
     *,
     holes: CarriedHoles | None = None,
+    faults: CarriedFaults | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> str:
@@ -103,6 +111,8 @@ def report_html(
         finite for each block with an image.
     holes : CarriedHoles, optional
         Drill-holes carried with the body.
+    faults : CarriedFaults, optional
+        Faults between the body's fault blocks.
     exploration : Exploration, optional
         Exploratory data analysis of a grade of the samples carried with the body.
     view : ViewOptions, optional
@@ -119,35 +129,46 @@ def report_html(
     check_rendering()
     summary = without_folders(summary)
     unit = str(mapping(summary.get("input")).get("unit", ""))
-    viewer = payload(body, holes=holes, view=view, unit=unit)
+    viewer = payload(body, holes=holes, faults=faults, view=view, unit=unit)
     script = _script()
     return Template(asset("page.html")).substitute(
         title=text(_title(summary, body.total)),
         digest=_digest(script),
         style=asset("style.css"),
         about=f"{body.total:,} blocks, geounfold {text(summary.get('version', ''))}",
-        body=_sections(summary, body, viewer.notes, holes, exploration, view),
+        body=_sections(summary, body, viewer.notes, _Carried(holes, faults, exploration), view),
         data=json_for_script(viewer.content),
         script=script,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """What was carried with a body."""
+
+    holes: CarriedHoles | None
+    faults: CarriedFaults | None
+    exploration: Exploration | None
 
 
 def _sections(
     summary: Mapping[str, Any],
     body: ReportBody,
     notes: tuple[str, ...],
-    holes: CarriedHoles | None,
-    exploration: Exploration | None,
+    carried: _Carried,
     view: ViewOptions | None,
 ) -> str:
     """Return the page's sections in order, without the empty ones."""
     parts = [
         verdict_section(verdict(summary), summary.get("warnings", [])),
-        views_section(notes, with_holes=holes is not None),
+        views_section(
+            notes, with_holes=carried.holes is not None, with_faults=carried.faults is not None
+        ),
+        faults_section(summary, carried.faults, body.unfolded, body.columns, CATEGORIES),
         stills_section(pictures(body, view)),
         figures_section(summary),
         distributions_section(body.results),
-        exploration_section(exploration),
+        exploration_section(carried.exploration),
         flaws_section(summary),
         crosscheck_section(summary),
         '<div class="duo">',

@@ -10,8 +10,9 @@
   16 bits per entry, GRADIENT_STEP each;
 - ``outer``: whether each block lies outside, and ``rows``: its data row.
 
-``columns`` holds the blocks' values, ``holes`` traces and samples in float32, and ``palettes`` the
-colour maps, 256 colours of three bytes each.
+``columns`` holds the blocks' values, ``holes`` traces and samples in float32, ``faults`` the fault
+surfaces of the folded space and the cut-offs in both, and ``palettes`` the colour maps, 256 colours
+of three bytes each.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from geounfold.report.arrays import encoded, floating_points, quantised_points
 from geounfold.report.blocks import Shape, block_shape, chosen_blocks, gradients, outer_blocks
 from geounfold.report.body import ReportBody
 from geounfold.report.columns import Column, read_columns
+from geounfold.report.faults import CarriedFaults, cutoff_lines, joined_surfaces
 from geounfold.report.plots.rendering import block_sides
 from geounfold.report.plots.style import ViewOptions, require
 
@@ -40,6 +42,11 @@ GRADIENT_STEP = 1 / 4096
 
 MOST_POINTS = 20_000
 """Points that a report holds at most, of traces and of samples each."""
+
+MOST_TRIANGLES = 60_000
+"""Triangles of fault surfaces that a report holds at most."""
+
+_NEAR = 3.0  # diagonals of a block from the body up to which a fault surface is drawn
 
 _ROOM = 3_600_000  # bytes for the values of columns, before base64
 _SAMPLE_COLUMNS = 12  # columns of samples at most
@@ -117,6 +124,7 @@ def payload(
     body: ReportBody,
     *,
     holes: CarriedHoles | None = None,
+    faults: CarriedFaults | None = None,
     view: ViewOptions | None = None,
     unit: str = "",
 ) -> Payload:
@@ -128,6 +136,8 @@ def payload(
         The blocks and their columns.
     holes : CarriedHoles, optional
         Drill-holes carried with the body.
+    faults : CarriedFaults, optional
+        Faults between the body's fault blocks.
     view : ViewOptions, optional
         The viewer's direction at the start.
     unit : str, optional
@@ -138,18 +148,22 @@ def payload(
     outer = outer_blocks(body.folded, shape)
     chosen = chosen_blocks(outer)
     columns, column_notes = _block_columns(body, chosen)
-    carried, hole_notes = _holes(holes, body.folded.min(axis=0), body.unfolded.min(axis=0))
+    corners = body.folded.min(axis=0), body.unfolded.min(axis=0)
+    carried, hole_notes = _holes(holes, *corners)
+    torn, fault_notes = _faults(faults, body.folded, *corners)
     content = {
         "blocks": _blocks(body, shape, outer, chosen),
         "columns": columns,
         "holes": carried,
+        "faults": torn,
         "palettes": palettes(),
         "categories": list(CATEGORIES),
         "view": {"azimuth": view.azimuth, "elevation": view.elevation},
         "unit": unit,
         "start": _start(columns),
     }
-    return Payload(content, (*_block_notes(body, outer, chosen), *column_notes, *hole_notes))
+    notes = (*_block_notes(body, outer, chosen), *column_notes, *hole_notes, *fault_notes)
+    return Payload(content, notes)
 
 
 def _blocks(body: ReportBody, shape: Shape | None, outer: Bools, chosen: Ints) -> dict[str, Any]:
@@ -219,6 +233,9 @@ def _gradient_codes(matrices: Floats) -> Floats:
 def _start(packed: list[dict[str, Any]]) -> str:
     """Return the column that colours the blocks at the start."""
     names = [column["name"] for column in packed]
+    kinds = {column["name"]: column.get("categories", ()) for column in packed}
+    if len(kinds.get("fault_block", ())) > 1:
+        return "fault_block"
     for name in ("stratigraphic", "nmd_error"):
         if name in names:
             return name
@@ -279,6 +296,28 @@ def _holes(
             "columns": [c.taken(rows).packed(short=False) for c in read],
         }
     return out, notes
+
+
+def _faults(
+    faults: CarriedFaults | None, points: Floats, folded: Floats, unfolded: Floats
+) -> tuple[dict[str, Any], list[str]]:
+    """Return fault surfaces and cut-offs relative to the body's corners, and notes."""
+    if faults is None:
+        return {}, []
+    reach = _NEAR * float(np.linalg.norm(block_sides(points)))
+    V, F = joined_surfaces(faults, points, reach)
+    notes = []
+    if len(F) > MOST_TRIANGLES:
+        notes.append(f"The fault surfaces have {len(F):,} triangles, too many to be drawn.")
+        V, F = V[:0], F[:0]
+    lines = {space: cutoff_lines(faults, space) for space in ("folded", "unfolded")}
+    step = -(-len(lines["folded"]) // MOST_POINTS) or 1
+    return {
+        "vertices": floating_points(V, folded),
+        "triangles": encoded(F, "u4"),
+        "folded": floating_points(lines["folded"][::step].reshape(-1, 3), folded),
+        "unfolded": floating_points(lines["unfolded"][::step].reshape(-1, 3), unfolded),
+    }, notes
 
 
 def _hole_codes(points: CarriedPoints) -> tuple[Ints, list[str]]:

@@ -56,11 +56,12 @@ def verdict_section(verdict: Verdict, warnings: object) -> str:
     return "".join(parts)
 
 
-def views_section(notes: tuple[str, ...], *, with_holes: bool) -> str:
+def views_section(notes: tuple[str, ...], *, with_holes: bool, with_faults: bool) -> str:
     """Return the 3-D views, with notes on what they leave out."""
     return Template(asset("viewer.html")).substitute(
         notes="".join(f'<p class="soft">{text(note)}</p>' for note in notes),
         holes="" if with_holes else "hidden",
+        faults="" if with_faults else "hidden",
     )
 
 

@@ -14,13 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.image import imread
 
 from geounfold.errors import MissingDependencyError
-from geounfold.report import CarriedHoles, CarriedPoints, write_report
+from geounfold.report import CarriedFaults, CarriedHoles, CarriedPoints, write_report
 from geounfold.report.plots.rendering import check_rendering
 from geounfold.report.plots.style import ViewOptions
+from geounfold.synthetic.faulted import simulate_faulted
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 BROWSER = next((found for name in BROWSERS if (found := shutil.which(name))), None)
@@ -355,3 +357,43 @@ def test_options_are_copied(browser: Any, report: Path) -> None:
     )
     assert page.evaluate("navigator.clipboard.readText()") == 'method = "sheet"\n'
     page.context.close()
+
+
+def test_faults_are_drawn_in_both_views_and_can_be_taken_away(
+    browser: Any, tmp_path: Path, pictures: Path
+) -> None:
+    body = simulate_faulted("graben", steps=(20.0, 20.0, 10.0))
+    table = []
+    for fault, slip in body.slips.items():
+        own = slip.blocks == slip.blocks[0]
+        rows = np.flatnonzero(own.all(axis=1) & (np.abs(slip.flat[:, 2]) < 5))
+        places = {"foot_": slip.footwall, "hanging_": slip.hanging_wall,
+                  "foot_unfolded_": slip.flat, "hanging_unfolded_": slip.flat}  # fmt: skip
+        table.append(
+            pd.DataFrame({
+                "fault": fault, "footwall_block": slip.blocks[rows, 0],
+                "hanging_wall_block": slip.blocks[rows, 1], "stratigraphic": 0.5,
+                "throw": slip.throw[rows], "strike_slip": 0.0, "gap": 1.0,
+                **{f"{wall}{axis}": P[rows, k] for wall, P in places.items()
+                   for k, axis in enumerate("xyz")},
+            })
+        )  # fmt: skip
+    faults = CarriedFaults(body.surfaces, pd.concat(table))
+    columns = {"fault_block": body.fault_block, "stratigraphic": body.level}
+    path = tmp_path / "faults.html"
+    write_report(path, {"injective": True}, body.folded, body.truth, columns, faults=faults)
+    opened = _opened(browser, path, 1000)
+    assert opened.complaints == []
+    assert "fault_block" in opened.locator("#legend").text_content()
+    opened.screenshot(path=pictures / "report_faults.png", full_page=True)
+    before = [_seen(opened, space) for space in ("folded", "unfolded")]
+    opened.locator("#faults").uncheck()
+    after = [_seen(opened, space) for space in ("folded", "unfolded")]
+    assert all(a != b for a, b in zip(before, after, strict=True))
+    assert opened.locator("figure.map svg").is_visible()
+    opened.context.close()
+
+
+def test_a_body_without_faults_offers_none(page: Any) -> None:
+    assert not page.locator("#faults").is_visible()
+    assert page.locator("figure.map").count() == 0

@@ -21,8 +21,14 @@ function readModel(data) {
     gradients: arrayOf(blocks.gradients), gradientStep: blocks.gradients.step, bent: blocks.bent,
     sides: blocks.sides, sizes: blocks.sizes && pointsOf(blocks.sizes), axes: blocks.axes,
     grow: blocks.grow, unit: data.unit,
-    columns: data.columns.map(columnOf), samples: null, traces: null,
+    columns: data.columns.map(columnOf), samples: null, traces: null, faults: null,
   };
+  if (data.faults.triangles) {
+    model.faults = {
+      vertices: pointsOf(data.faults.vertices), triangles: arrayOf(data.faults.triangles),
+      folded: pointsOf(data.faults.folded), unfolded: pointsOf(data.faults.unfolded),
+    };
+  }
   for (const name of ["traces", "samples"]) {
     const packed = data.holes[name];
     if (!packed) continue;
@@ -73,6 +79,13 @@ function segmentsOf(traces, space, centre) {
   return new Float32Array(out);
 }
 
+// Places of points one after the other, relative to a centre.
+function relativeTo(points, centre) {
+  const out = new Float32Array(3 * points.count);
+  for (let k = 0; k < points.count; k++) out.set(points.place(k).map((x, a) => x - centre[a]), 3 * k);
+  return out;
+}
+
 // Return the middle of a body as it is first seen, about which it turns, and its width and height.
 function middleOf(places, extents, start, room) {
   const axes = new Camera(start.azimuth, start.elevation).axes();
@@ -101,6 +114,10 @@ function bodyOf(model, space, start) {
     unit_name: model.unit, gradients: space === model.bent ? model.gradients : null,
     segments: model.traces ? segmentsOf(model.traces, space, centre) : null,
     samples: null, sizes: model.sizes, axes: model.axes, grow: model.grow,
+    cutoffs: model.faults && relativeTo(model.faults[space], centre),
+    sheets: model.faults && space === "folded"
+      ? { places: relativeTo(model.faults.vertices, centre), triangles: model.faults.triangles }
+      : null,
   };
   if (model.samples) {
     body.samples = new Float32Array(3 * model.samples.count);
@@ -110,7 +127,7 @@ function bodyOf(model, space, start) {
   }
   const far = extents.map(([a, b], i) => Math.max(centre[i] - a, b - centre[i]));
   let reach = Math.hypot(...far);
-  for (const points of [body.segments, body.samples]) {
+  for (const points of [body.segments, body.samples, body.sheets && body.sheets.places]) {
     for (let k = 0; points && k < points.length; k += 3) {
       const length = Math.hypot(points[k], points[k + 1], points[k + 2]);
       if (length > reach) reach = length;
@@ -183,7 +200,7 @@ class Report {
       this.byId(id).addEventListener("change", () => { this.colour(); this.draw(); });
     }
     this.setUpSamples();
-    for (const id of ["edges", "traces", "samples"]) {
+    for (const id of ["edges", "traces", "samples", "faults"]) {
       this.byId(id).addEventListener("change", () => this.draw());
     }
     this.byId("linked").addEventListener("change", () => this.turned(this.views[0]));
@@ -208,6 +225,7 @@ class Report {
     const samples = this.model.samples, select = this.byId("sample-colour");
     this.byId("samples").closest("label").hidden = !samples;
     this.byId("traces").closest("label").hidden = !this.model.traces;
+    this.byId("faults").closest("label").hidden = !this.model.faults;
     select.closest("label").hidden = !samples || !samples.columns.length;
     if (!samples) return;
     const plain = { name: "one colour", label: "", group: "None", kind: "plain" };
@@ -343,7 +361,8 @@ class Report {
   drawNow() {
     const look = {
       edges: this.byId("edges").checked, traces: this.byId("traces").checked,
-      samples: this.byId("samples").checked, picked: this.picked,
+      samples: this.byId("samples").checked, faults: this.byId("faults").checked,
+      fault: themeColour("--fault"), picked: this.picked,
       trace: themeColour("--trace"), pick: themeColour("--pick"), sample: [0.9, 0.62, 0],
     };
     this.views.forEach((view, i) => {

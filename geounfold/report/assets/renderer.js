@@ -81,6 +81,10 @@ void main() {
   gl_Position = seen(place); gl_PointSize = wide;
 }`;
 
+const SHEET_VERTEX = `${COMMON}
+layout(location=0) in vec3 place;
+void main() { gl_Position = seen(place); }`;
+
 const FLAT_FRAGMENT = `#version 300 es
 precision highp float; precision highp int;
 uniform vec4 plain; layout(location=0) out vec4 colour;
@@ -131,11 +135,14 @@ class Renderer {
     this.blockProgram = this.program(BLOCK_VERTEX, BLOCK_FRAGMENT);
     this.ribbonProgram = this.program(RIBBON_VERTEX, FLAT_FRAGMENT);
     this.dotProgram = this.program(DOT_VERTEX, DOT_FRAGMENT);
+    this.sheetProgram = this.program(SHEET_VERTEX, FLAT_FRAGMENT);
     this.shades = this.texture();
     this.table = this.texture();
     this.sampleTable = this.texture();
     this.makeBlocks();
-    this.makeRibbons();
+    this.ribbons = this.makeRibbons(this.body.segments);
+    this.cutoffs = this.makeRibbons(this.body.cutoffs);
+    this.makeSheets();
     this.makeDots();
     this.makePicker();
     gl.enable(gl.DEPTH_TEST);
@@ -217,12 +224,12 @@ class Renderer {
     this.count = 0;
   }
 
-  makeRibbons() {
-    const gl = this.gl, segments = this.body.segments;
-    this.segmentCount = segments ? segments.length / 6 : 0;
-    if (!this.segmentCount) return;
-    this.ribbons = gl.createVertexArray();
-    gl.bindVertexArray(this.ribbons);
+  // Return ribbons along segments, six numbers each: a vertex array and their count.
+  makeRibbons(segments) {
+    const gl = this.gl, made = { array: null, count: segments ? segments.length / 6 : 0 };
+    if (!made.count) return made;
+    made.array = gl.createVertexArray();
+    gl.bindVertexArray(made.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, -0.5, 1, -0.5, 0, 0.5, 1, 0.5]),
       gl.STATIC_DRAW);
@@ -235,6 +242,22 @@ class Renderer {
       gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, from);
       gl.vertexAttribDivisor(slot, 1);
     }
+    return made;
+  }
+
+  makeSheets() {
+    const gl = this.gl, sheets = this.body.sheets;
+    this.sheetCount = sheets ? sheets.triangles.length : 0;
+    if (!this.sheetCount) return;
+    this.sheets = gl.createVertexArray();
+    gl.bindVertexArray(this.sheets);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, sheets.places, gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, sheets.triangles, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
   }
 
   makeDots() {
@@ -328,7 +351,11 @@ class Renderer {
       gl.depthFunc(hidden ? gl.GREATER : gl.LEQUAL);
       gl.depthMask(!hidden);
       gl.enable(gl.BLEND);
-      if (look.traces) this.drawRibbons(camera, size, look.trace, alpha);
+      if (look.faults) {
+        if (!hidden) this.drawSheets(camera, size, look.fault);
+        this.drawRibbons(this.cutoffs, camera, size, look.fault, alpha);
+      }
+      if (look.traces) this.drawRibbons(this.ribbons, camera, size, look.trace, alpha);
       if (look.samples) this.drawDots(camera, size, look.sample, alpha);
       gl.disable(gl.BLEND);
     }
@@ -375,15 +402,28 @@ class Renderer {
     gl.disable(gl.CULL_FACE);
   }
 
-  drawRibbons(camera, size, colour, alpha) {
-    if (!this.segmentCount) return;
+  drawRibbons(ribbons, camera, size, colour, alpha) {
+    if (!ribbons.count) return;
     const gl = this.gl, program = this.ribbonProgram;
     this.useCamera(program, camera, size);
     gl.uniform2f(program.uniform("pixel"), 2 / this.canvas.width, 2 / this.canvas.height);
     gl.uniform1f(program.uniform("wide"), 2.2 * size.ratio);
     gl.uniform4f(program.uniform("plain"), ...colour, alpha);
-    gl.bindVertexArray(this.ribbons);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.segmentCount);
+    gl.bindVertexArray(ribbons.array);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, ribbons.count);
+  }
+
+  // Draw fault surfaces before what lies behind them: translucent, and they hide nothing.
+  drawSheets(camera, size, colour) {
+    if (!this.sheetCount) return;
+    const gl = this.gl;
+    this.useCamera(this.sheetProgram, camera, size);
+    gl.uniform4f(this.sheetProgram.uniform("plain"), ...colour, 0.18);
+    gl.depthMask(false);
+    gl.bindVertexArray(this.sheets);
+    gl.drawElements(gl.TRIANGLES, this.sheetCount, gl.UNSIGNED_INT, 0);
+    gl.bindVertexArray(null);
+    gl.depthMask(true);
   }
 
   drawDots(camera, size, colour, alpha) {

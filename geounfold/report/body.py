@@ -33,7 +33,8 @@ class ReportBody:
     results : dict of (n,) float
         Columns of the result that the still pictures and distributions show.
     neighbours : (n, k) int or None
-        Rows of each block's neighbours when folded; None if there are too few blocks.
+        Rows of each block's neighbours when folded, in its own fault block if that has enough
+        blocks; None if there are too few blocks.
     distances : two of (n,) float, or None
         Neighbour mean distances in both spaces, in the input's unit.
     """
@@ -75,7 +76,7 @@ def report_body(folded: Floats, unfolded: Floats, columns: Mapping[str, ArrayLik
     known = {n: _placed(n, v, placed) for n, v in columns.items() if n not in _COORDINATES}
     results = {n: _finite(n, known[n]) for n in ("stratigraphic", *DISTRIBUTED) if n in known}
     X, Y = X[placed], Y[placed]
-    ids = neighbours(X) if len(X) > NEIGHBOURS else None
+    ids = _neighbours(X, known.get("fault_block"))
     distances = None if ids is None else (nmd(X, ids), nmd(Y, ids))
     if distances is not None:
         results.setdefault("nmd_error", np.abs(distances[0] - distances[1]) / distances[0])
@@ -83,6 +84,25 @@ def report_body(folded: Floats, unfolded: Floats, columns: Mapping[str, ArrayLik
         known |= dict(zip(("nmd_folded", "nmd_unfolded"), distances, strict=True))
     rows = np.flatnonzero(placed) + 1
     return ReportBody(X, Y, rows, len(placed), known, results, ids, distances)
+
+
+def _neighbours(X: Floats, fault_block: ArrayLike | None) -> Ints | None:
+    """Return the rows of each block's neighbours (n, k); None if there are too few blocks.
+
+    A fault parts neighbours: distances across it change by the slip, which is no distortion.
+    """
+    if len(X) <= NEIGHBOURS:
+        return None
+    _, own = np.unique(np.zeros(len(X)) if fault_block is None else np.asarray(fault_block),
+                       return_inverse=True)  # fmt: skip
+    count = np.bincount(own.ravel())
+    if len(count) == 1 or count.min() <= NEIGHBOURS:
+        return neighbours(X)
+    out = np.empty((len(X), NEIGHBOURS), np.int64)
+    for block in range(len(count)):
+        rows = np.flatnonzero(own.ravel() == block)
+        out[rows] = rows[neighbours(X[rows])]
+    return out
 
 
 def _placed(name: str, values: ArrayLike, placed: Bools) -> ArrayLike:

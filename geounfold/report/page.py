@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 _SCRIPTS = ("decode", "colour", "camera", "renderer", "view", "inspect", "controls", "main")
 
 
-def write_report(
+def write_report(  # 9 arguments: the file, the body, and by keyword what was carried with it
     path: str | Path,
     summary: Mapping[str, Any],
     folded: Floats,

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from geounfold.errors import InputError
 from geounfold.report import CarriedFaults
+from geounfold.report.body import report_body
 from geounfold.report.columns import read_columns
 from geounfold.report.faults import (
     SLIP_COLUMNS,
@@ -143,3 +144,17 @@ def test_surfaces_of_several_faults_keep_their_triangles() -> None:
     V, F = joined_surfaces(CarriedFaults({"a": SQUARE, "b": other}, slips()), BLOCKS, 2.0)
     assert (len(V), len(F)) == (8, 4)
     assert_allclose(V[F].mean(axis=1)[:, 2], [0, 0, 1, 1])
+
+
+def test_neighbours_of_a_block_lie_in_its_own_fault_block() -> None:
+    moved = BLOCKS + np.where(COLUMNS["fault_block"][:, None] == 1, [0, 1.5, 0], 0)
+    body = report_body(moved, BLOCKS, COLUMNS)
+    assert body.neighbours is not None
+    own = COLUMNS["fault_block"]
+    assert (own[body.neighbours] == own[:, None]).all()
+    # Each half moved as a rigid body: its own distances stay, to rounding.
+    assert body.results["nmd_error"].max() < 1e-12
+    across = report_body(moved, BLOCKS, {"stratigraphic": COLUMNS["stratigraphic"]})
+    assert across.results["nmd_error"].max() > 0.1
+    few = {"fault_block": np.where(np.arange(len(BLOCKS)) < 3, 1, 0)}
+    assert report_body(moved, BLOCKS, few).neighbours is not None

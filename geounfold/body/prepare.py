@@ -42,6 +42,9 @@ class PreparedPoints:
         What was mended of these bodies.
     division : Division or None
         The sheet parts; None if every body is one sheet.
+    cells : (m, 3) int or None
+        Cells of the lattice that the blocks of the bodies to unfold occupy, before mending; None
+        without a lattice.
     """
 
     points: Floats
@@ -51,6 +54,7 @@ class PreparedPoints:
     groups: tuple[Ints, ...]
     mended: MendingRecord
     division: Division | None = None
+    cells: Ints | None = None
 
     @property
     def bodies(self) -> int:
@@ -152,7 +156,9 @@ def prepare(
         fitted, found = _mended(work[rows], rows, home, frame)
         record = record if found is None else record.joined(found)
         bodies.append(BodyPoints(_sorted(fitted), _sorted(given[group]), found))
-    prepared = PreparedPoints(points, given, frame, lattice, groups, record)
+    chosen = np.isin(labels, [own[group[0]] for group in groups])
+    taken = None if frame.steps is None else np.rint(work[chosen] / frame.steps).astype(np.int64)
+    prepared = PreparedPoints(points, given, frame, lattice, groups, record, cells=taken)
     return _divided(prepared, bodies) if parts else (prepared, bodies)
 
 

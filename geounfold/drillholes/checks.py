@@ -16,6 +16,7 @@ from geounfold.drillholes.findings import ERROR, NOTE, WARNING, Log, Severity
 from geounfold.drillholes.tables import HoleTable
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.selection import nearest_name
 
 LEFT_OUT = "left out"
 
@@ -180,7 +181,8 @@ def placed_intervals(table: HoleTable, good: Bools, collars: Collars, log: Log) 
         rows = np.flatnonzero(good & (table.hole == name))
         log.add(
             table.source, "assays of a hole without a usable collar", ERROR, "hole left out",
-            hole=str(name), row=int(table.row[rows[0]]), detail=f"{len(rows)} intervals",
+            hole=str(name), row=int(table.row[rows[0]]),
+            detail=f"{len(rows)} intervals{_nearest(str(name), collars)}",
         )  # fmt: skip
     at = np.flatnonzero(good & (hole >= 0))
     start, end = table.numbers["from"], table.numbers["to"]
@@ -211,6 +213,12 @@ def placed_intervals(table: HoleTable, good: Bools, collars: Collars, log: Log) 
             _add(log, table, at[k], check, WARNING, action, text)
         cut = np.where(over, limit, cut)
     return Intervals(hole[at], start[at], cut, at)
+
+
+def _nearest(name: str, collars: Collars) -> str:
+    """Return words for the collar's name most like another; empty if none is alike."""
+    near = nearest_name(name, collars.names)
+    return "" if near is None else f"; the nearest collar is '{near}'"
 
 
 def checked_stations(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,12 @@ from geounfold.drillholes.checks import Collars, Intervals, Stations
 from geounfold.drillholes.composite import CompositeOptions, Residual, composite
 from geounfold.drillholes.desurvey import Paths, desurvey, directions
 from geounfold.drillholes.findings import ERROR, NOTE, Finding, Log, facts, messages, refusal
-from geounfold.drillholes.tables import HoleTable, check_fields, grade_columns, read_hole_table
+from geounfold.drillholes.grades import AssayColumns, grade_columns
+from geounfold.drillholes.names import matched_names
+from geounfold.drillholes.tables import HoleTable, check_fields, read_hole_table
 from geounfold.errors import InputError, OptionError
 from geounfold.geometry.mesh import Bools, Floats
+from geounfold.io.grade_values import GradeRules, grade_rules
 
 SURVEYED, EXTRAPOLATED = "surveyed", "extrapolated"
 SAMPLE_COLUMNS = ("hole", "from", "to", "x", "y", "z", "position", "coverage")
@@ -56,6 +59,8 @@ class DrillHoles:
         Number of rows of each table as read.
     findings : tuple of Finding
         Findings of the checks.
+    assay_columns : AssayColumns
+        How the values of the assay table were read.
     """
 
     sources: Mapping[str, str]
@@ -70,6 +75,7 @@ class DrillHoles:
     stated: bool
     rows: Mapping[str, int]
     findings: tuple[Finding, ...]
+    assay_columns: AssayColumns
 
     def __len__(self) -> int:
         return len(self.collars)
@@ -219,8 +225,9 @@ class DrillHoles:
         )
 
     def messages(self) -> list[str]:
-        """Return one line for each kind of finding."""
-        return messages(self.findings)
+        """Return one line for each kind of finding, and for each cap what it changed."""
+        capped = [f"{self.sources['assay']}: {cap}" for cap in self.assay_columns.caps]
+        return messages(self.findings) + capped
 
     def facts(self) -> dict[str, Any]:
         """Return the counts of rows, holes and findings, for a summary."""
@@ -233,11 +240,13 @@ class DrillHoles:
             "dip_positive_down": self.positive_down,
             "dip_convention": "stated" if self.stated else "detected",
             "grades": list(self.grades),
+            "grade_values": {n: dict(c) for n, c in self.assay_columns.counts.items()},
+            "caps": [asdict(cap) for cap in self.assay_columns.caps],
             **facts(self.findings),
         }
 
 
-def read_drillholes(  # 9 arguments: a public name; six of them are choices by keyword
+def read_drillholes(  # 10 arguments: a public name; seven of them are choices by keyword
     collar: str | Path | pd.DataFrame,
     survey: str | Path | pd.DataFrame,
     assay: str | Path | pd.DataFrame,
@@ -248,6 +257,7 @@ def read_drillholes(  # 9 arguments: a public name; six of them are choices by k
     strict: bool = False,
     drop_invalid: bool = False,
     where: str | None = None,
+    values: GradeRules | Mapping[str, Any] | None = None,
 ) -> DrillHoles:
     """Return drill-holes from their three tables, checked and desurveyed.
 
@@ -273,13 +283,17 @@ def read_drillholes(  # 9 arguments: a public name; six of them are choices by k
         survey) instead of raising.
     where : str, optional
         Chooses rows of the assay table, such as ``"LITH=QZ and AU>0.2"``.
+    values : GradeRules or mapping, optional
+        How the values of grades are read: ``missing`` codes, ``below_detection`` (missing, half or
+        zero), ``cap`` by column (a number or p99).
 
     Raises
     ------
     InputError
         A table cannot be read, a column is missing or ambiguous, no row is left, dips have both
-        signs and no convention is stated, a hole cannot be placed (without `drop_invalid`), or
-        there is a finding other than notes (with `strict`).
+        signs and no convention is stated, fewer than half of a grade's values are numbers, a hole
+        cannot be placed (without `drop_invalid`), or there is a finding other than notes (with
+        `strict`).
 
     Examples
     --------
@@ -298,6 +312,8 @@ def read_drillholes(  # 9 arguments: a public name; six of them are choices by k
         for kind, given in (("collar", collar), ("survey", survey), ("assay", assay))
     }
     check_fields(names, tables)
+    for kind in ("survey", "assay"):
+        tables[kind] = matched_names(tables[kind], tables["collar"], log)
     good, with_assays = checks.checked_intervals(tables["assay"], log)
     assayed = {str(name) for name in with_assays}
     collars = checks.checked_collars(tables["collar"], assayed, log)
@@ -311,7 +327,8 @@ def read_drillholes(  # 9 arguments: a public name; six of them are choices by k
     collars, stations, intervals = _placed(collars, stations, intervals)
     ends = _ends(collars, stations, intervals)
     checks.extrapolated(stations, ends, collars, source, log)
-    grade, words = grade_columns(tables["assay"], None if grades is None else tuple(grades), log)
+    chosen = None if grades is None else tuple(grades)
+    columns_read = grade_columns(tables["assay"], chosen, grade_rules(values), log)
     _refuse(log.found, strict=strict, drop_invalid=drop_invalid)
     paths = desurvey(
         collars.points, stations.hole, stations.depth, directions(stations.azimuth, stations.dip)
@@ -323,13 +340,19 @@ def read_drillholes(  # 9 arguments: a public name; six of them are choices by k
         intervals=intervals,
         paths=paths,
         ends=ends,
-        grades={name: values[intervals.position] for name, values in grade.items()},
-        words={name: values[intervals.position] for name, values in words.items()},
+        grades=_at(columns_read.grades, intervals),
+        words=_at(columns_read.words, intervals),
         positive_down=down,
         stated=dip_positive_down is not None,
         rows={kind: int(table.row[-1]) for kind, table in tables.items()},
         findings=tuple(log.found),
+        assay_columns=columns_read,
     )
+
+
+def _at(columns: Mapping[str, np.ndarray], intervals: Intervals) -> dict[str, np.ndarray]:
+    """Return columns of the assay table at the intervals that are kept."""
+    return {name: values[intervals.position] for name, values in columns.items()}
 
 
 def _check_left(

@@ -168,7 +168,7 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
         others = f" ({counted(len(bad), 'such value')})" if len(bad) > 1 else ""
         raise InputError(
             f"{source}: column '{name}' is not numeric: data row {bad[0] + 1} has "
-            f"'{shown(first)}'{others}{_hint(first)}"
+            f"'{shown(first)}'{others}{number_hint(first)}"
         )
     return values
 
@@ -209,7 +209,7 @@ def _with_gaps(text: np.ndarray) -> tuple[Floats, Bools]:
     return values, np.asarray(~missing & ~good)
 
 
-def _hint(word: str) -> str:
+def number_hint(word: str) -> str:
     """Return the remedy for a number with a decimal comma or thousands separators, else nothing."""
     if "," in word and _DECIMAL_COMMA.fullmatch(word):
         return "; write decimals with a point, not a comma"

@@ -32,12 +32,11 @@ from geounfold.backends.system import files
 from geounfold.errors import InputError
 
 FORMAT = "geounfold-map"
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 OLDEST = 2
 """Oldest version that can be read."""
 
-_UNDIVIDED = 3  # version written for bodies that are not divided into parts
-_UNFAULTED = 4  # version written for bodies divided into sheets, not into fault blocks
+_OLDEST_WRITTEN = 3  # version written if no array is of a later one
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -111,6 +110,9 @@ ARRAYS: Mapping[str, Layout] = {
     "fault_vertices": Layout(_FLOAT, ("corners?", 3)),
     "fault_triangles": Layout(_INDEX, ("triangles?", 3), below="corners?"),
     "fault_surface": Layout(_INDEX, ("triangles?",), below="triangles?"),
+    "body_lowest": Layout(_INDEX, (3,)),
+    "body_shape": Layout(_INDEX, (3,), holds=lambda a: bool((a >= 0).all()), must="be 0 or more"),
+    "body_bits": Layout("|u1", ("bits?",)),
 }
 """Every array of a map file. One that is added here must raise FORMAT_VERSION too."""
 
@@ -125,6 +127,9 @@ ADDED: Mapping[str, tuple[int, Any]] = {
     "fault_vertices": (5, np.zeros((0, 3))),
     "fault_triangles": (5, np.zeros((0, 3))),
     "fault_surface": (5, np.zeros(0)),
+    "body_lowest": (6, np.zeros(3)),
+    "body_shape": (6, np.zeros(3)),
+    "body_bits": (6, np.zeros(0)),
 }
 """Arrays added later: the first version that has each, and its value in older files."""
 
@@ -160,8 +165,8 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
     path : path or binary stream
         Destination.
     arrays : dict of arrays
-        The arrays of ARRAYS, of any type that converts without loss; without those on parts or
-        faults for bodies that have none, whose file is of an earlier version.
+        The arrays of ARRAYS, of any type that converts without loss. Those of ADDED may be left
+        out. The file is of the first version that has all arrays given.
 
     Raises
     ------
@@ -173,11 +178,10 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
         for name, layout in ARRAYS.items()
         if name in arrays
     }
-    version = _UNFAULTED if "vertex_part" in arrays else _UNDIVIDED
-    if "fault_points" in arrays:
-        version = FORMAT_VERSION
+    version = max(_OLDEST_WRITTEN, *(first for n, (first, _) in ADDED.items() if n in arrays))
     late = {n for n, (first, _) in ADDED.items() if first > version}
-    _check_names({*arrays}, {*ARRAYS} - late, "the map")
+    exact = _left_out({*ADDED} - late - {*arrays}) | exact
+    _check_names({*arrays} | {*exact}, {*ARRAYS} - late, "the map")
     _check_arrays({**exact, **_left_out(late)}, "the map")
     whole = {"format": np.array(FORMAT), "version": np.array(version, "<i8"), **exact}
     stream = io.BytesIO()

@@ -16,6 +16,7 @@ from geounfold.body.fault_cells import FaultCells
 from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError, check_one_of
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers, TetMesh
+from geounfold.mapping.body_cells import BodyCells
 from geounfold.mapping.carried import Carried, Returned, checked_points
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients
@@ -61,6 +62,8 @@ class UnfoldingMap:
     parts : MapParts, optional
         The parts of a map whose control mesh is several that touch: each folded point is carried
         by the mesh of its own part.
+    body : BodyCells, optional
+        The body's own blocks; without, the map does not hold them.
 
     Raises
     ------
@@ -77,6 +80,7 @@ class UnfoldingMap:
         known: Sequence[TetIndex] = (),
         coordinates: str = "tet",
         parts: MapParts | None = None,
+        body: BodyCells | None = None,
     ) -> None:
         check_one_of("coordinates", coordinates, COORDINATES)
         self.coordinates = coordinates
@@ -85,6 +89,7 @@ class UnfoldingMap:
         self.shell = shell
         self.reach = reach
         self.parts = parts
+        self.body = body
         self._known = tuple(known)
 
     @cached_property
@@ -342,6 +347,35 @@ class UnfoldingMap:
             out[rows] = self.prisms.gradients(work[rows], element[rows])
         return out
 
+    def in_body(self, points: Floats, carried: Carried) -> Bools:
+        """Return which folded points (n, 3) lie in the body's own blocks.
+
+        A map without the blocks (of scattered points, or saved by an older version) has points
+        inside the control mesh between the bottom and the top surface instead. The control mesh
+        reaches beyond the body's rim, so that these are too many.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In the data's coordinates.
+        carried : Carried
+            Result of ``carry``.
+        """
+        if self.body is not None:
+            return self.body.hold(self.frame.to_work(points))
+        with np.errstate(invalid="ignore"):
+            between = (carried.stratigraphic >= 0) & (carried.stratigraphic <= 1)
+        return np.asarray(carried.inside & between)
+
+    def body_distance(self, points: Floats, carried: Carried) -> Floats:
+        """Return how far folded points (n, 3) lie from the body, in blocks, (n,); 0 inside.
+
+        See `BodyCells.distance`; without the blocks, it is the distance from the control mesh.
+        """
+        if self.body is not None:
+            return self.body.distance(self.frame.to_work(points))
+        return np.asarray(carried.distance / self.frame.scale)
+
     def to_flat(self, points: Floats, fault_block: Ints | None = None) -> Floats:
         """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""
         return self.carry_by_block(points, fault_block).points
@@ -381,6 +415,7 @@ class UnfoldingMap:
             "shell": whole.folded.T[count:],
             "stratigraphic": whole.stratigraphic,
             **({} if self.parts is None else self.parts.arrays()),
+            **({} if self.body is None else self.body.arrays()),
         }
 
 
@@ -428,4 +463,5 @@ def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:
         float(arrays["reach"]),
         coordinates=coordinates,
         parts=MapParts.of_arrays(arrays, frame.steps),
+        body=BodyCells.of_arrays(arrays, frame.steps),
     )

@@ -22,6 +22,7 @@ from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
 from geounfold.io.selection import read_where
 from geounfold.io.tables.points import chosen_rows
+from geounfold.mapping.body_cells import BodyCells
 from geounfold.mapping.carried import checked_points
 from geounfold.mapping.certificate import certify
 from geounfold.mapping.control_mesh import side_by_side, vertex_parts
@@ -234,4 +235,9 @@ def _one_map(
         if not certify(control, shell, none).injective:
             control, shell = side_by_side([(control, None) for control, _ in meshes])
     reach = options.reach if reach is None else reach
-    return UnfoldingMap(frame, control, shell, reach, coordinates=options.coordinates, parts=parts)
+    cells, steps = prepared.cells, frame.steps
+    body = None if cells is None or steps is None else BodyCells.of(cells, steps)
+    return UnfoldingMap(
+        frame, control, shell, reach,
+        coordinates=options.coordinates, parts=parts, body=body,
+    )  # fmt: skip

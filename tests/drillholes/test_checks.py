@@ -216,6 +216,6 @@ def test_grades_that_are_no_numbers_are_not_zero() -> None:
     assert samples["CU"].iloc[1] == 4.0
     assert samples["ROCK"].tolist() == ["ore", "waste"]
     assert samples["assay_x"].tolist() == [7.0, 8.0]
-    assert ("CU is not a number", "A", 1) in found(holes)
+    assert ("CU is below detection", "A", 1) in found(holes)
     only = read_drillholes(collar, survey, assay, grades=["x"]).samples()
     assert only["CU"].tolist() == ["<0.01", "4"]

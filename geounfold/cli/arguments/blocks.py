@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_command, add_element, add_frame, add_where
+from geounfold.cli.arguments.groups import (
+    add_command,
+    add_element,
+    add_frame,
+    add_grade_values,
+    add_where,
+)
 from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.texts import ANGLES, POINT_FORMATS, POINTS, TABLES, WHERE, joined
 
@@ -85,6 +91,7 @@ def add_transfer(commands: Any) -> Parser:
     add_where(group, "source-where", "rows of SOURCE to take, as --where", rare=False)
     for side in ("source", "target"):
         add_element(group, f"{side}-element", side.upper())
+    add_grade_values(group)
     group.add(
         "--drop-invalid", action="store_true", rare=True, help="leave out rows without coordinates"
     )

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_columns, add_command, add_samples_choice
+from geounfold.cli.arguments.groups import (
+    add_columns,
+    add_command,
+    add_grade_values,
+    add_samples_choice,
+)
 from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, WHERE, joined
 
@@ -48,6 +53,7 @@ def add_estimate(commands: Any) -> Parser:
     group.add("--grade", metavar="NAME", required=True, help="column of SAMPLES to estimate")
     group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
     add_samples_choice(group)
+    add_grade_values(group, rare=False)
     add_columns(group)
     group = parser.section("outputs")
     group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")

@@ -98,6 +98,7 @@ def add_holes(section: Section) -> None:
     section.add(
         "--composite", metavar="LENGTH", help="length of composites along a hole, from its collar"
     )
+    add_grade_values(section)
     section.add(
         "--traces-out", metavar="T", help="the holes' paths in both spaces: a table or .vtp"
     )
@@ -120,6 +121,29 @@ def add_holes(section: Section) -> None:
         action="store_true",
         rare=True,
         help="refuse what is otherwise a warning: rows left out, cut or changed, and poor trust",
+    )
+
+
+def add_grade_values(section: Section, *, rare: bool = True) -> None:
+    """Add the options for the values of grades."""
+    section.add(
+        "--missing",
+        metavar="V,V,...",
+        rare=rare,
+        help="values of grades that mean no value, such as -99,-999,-",
+    )
+    section.add(
+        "--below-detection",
+        metavar="RULE",
+        rare=rare,
+        help="what <0.01 in a grade becomes: missing (default), half of the limit, or zero",
+    )
+    section.add(
+        "--cap",
+        metavar="COLUMN=VALUE",
+        action="append",
+        rare=rare,
+        help="cap a grade at a number or a percentile such as p99; once for each column",
     )
 
 

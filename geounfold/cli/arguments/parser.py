@@ -22,6 +22,8 @@ from geounfold.cli.arguments.tools import (
 )
 from geounfold.cli.arguments.unfold import add_unfold
 
+_NEGATIVE = ("--up", "--missing", "--origin", "--rotation")  # values may begin with a minus sign
+
 _EXAMPLES = ("geounfold unfold --help", "geounfold unfold blocks.csv -o flat.csv --report r.html")
 
 
@@ -55,8 +57,8 @@ def _joined(argv: Sequence[str]) -> list[str]:
     """Return arguments with ``--up -1,0,0`` as one word, which argparse takes for a flag else."""
     joined: list[str] = []
     for word in argv:
-        if joined and joined[-1] == "--up" and word[:1] == "-":
-            joined[-1] = f"--up={word}"
+        if joined and joined[-1] in _NEGATIVE and word[:1] == "-" and word[:2] != "--":
+            joined[-1] = f"{joined[-1]}={word}"
         else:
             joined.append(word)
     return joined

@@ -77,7 +77,7 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
         volumes,
         samples,
         holes,
-        graded_samples(args, samples, holes),
+        graded_samples(args, samples, holes, console),
         None if args.top is None else read_surface(args.top),
         None if args.bottom is None else read_surface(args.bottom),
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from geounfold.cli.inputs.values import values_rules
 from geounfold.errors import OptionError
 from geounfold.io.paths import ending
 from geounfold.io.polylines import write_polylines
@@ -125,6 +126,7 @@ def read_holes(args: Namespace, console: Console, where: str = "samples_where") 
         strict=args.strict,
         drop_invalid=args.drop_invalid,
         where=getattr(args, where, None) if where else None,
+        values=values_rules(args),
     )
     for line in holes.messages():
         console.warn(line)

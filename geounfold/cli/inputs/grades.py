@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from geounfold.cli.inputs.values import read_grade
 from geounfold.errors import InputError, OptionError
 from geounfold.io.coordinate_columns import numbers
 
 if TYPE_CHECKING:
     from geounfold.cli.inputs.drillholes import HoleData
+    from geounfold.cli.terminal.console import Console
     from geounfold.estimation import Exploration
     from geounfold.geometry.mesh import Floats
     from geounfold.io import PointTable
@@ -36,7 +38,7 @@ def check_grade_options(args: Namespace) -> None:
 
 
 def graded_samples(
-    args: Namespace, samples: PointTable | None, holes: HoleData | None
+    args: Namespace, samples: PointTable | None, holes: HoleData | None, console: Console
 ) -> pd.DataFrame | None:
     """Return coordinates and grade of the samples to explore; None without --grade.
 
@@ -49,7 +51,7 @@ def graded_samples(
     """
     if args.grade is None:
         return None
-    points, grades, source = _table(args.grade, samples, holes)
+    points, grades, source = _table(args, samples, holes, console)
     from geounfold.estimation import FEWEST_SAMPLES
 
     known = int(np.count_nonzero(np.isfinite(grades)))
@@ -78,13 +80,14 @@ def exploration(args: Namespace, result: Unfolding, graded: pd.DataFrame) -> Exp
 
 
 def _table(
-    grade: str, samples: PointTable | None, holes: HoleData | None
+    args: Namespace, samples: PointTable | None, holes: HoleData | None, console: Console
 ) -> tuple[Floats, Floats, str]:
     """Return coordinates, (n, 3), grades, (n,), and their file."""
+    grade = args.grade
     if samples is not None:
         if grade in (*samples.columns, *"xyz"):
             raise OptionError(f"--grade {grade} names a coordinate")
-        return samples.points, samples.numbers(grade), samples.source
+        return samples.points, read_grade(samples, grade, args, console), samples.source
     if holes is None or holes.samples is None:  # checked with the options
         raise OptionError("--grade needs the samples that hold it: --holes, or --samples")
     from geounfold.drillholes.holes import SAMPLE_COLUMNS

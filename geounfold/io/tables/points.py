@@ -104,6 +104,16 @@ class PointTable:
         InputError
             No such column, two of that name, or a value that is not a number.
         """
+        return numbers(self.column(column), source=self.source)
+
+    def column(self, column: str) -> pd.Series:
+        """Return a column as it was read.
+
+        Raises
+        ------
+        InputError
+            No such column, or two of that name.
+        """
         where = np.flatnonzero(self.frame.columns == column)
         if len(where) != 1:
             what = "no" if not len(where) else "more than one"
@@ -111,7 +121,7 @@ class PointTable:
                 f"{self.source}: {what} column '{shown(column)}'; the file has: "
                 f"{listing(self.frame.columns)}"
             )
-        return numbers(self.frame.iloc[:, int(where[0])], source=self.source)
+        return self.frame.iloc[:, int(where[0])]
 
     def with_columns(self, columns: dict[str, Any]) -> pd.DataFrame:
         """Return the frame with results at its end; one of the same name is replaced in place.

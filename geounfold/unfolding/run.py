@@ -176,6 +176,7 @@ def _faulted(
             *(prepared.frame, control, shell, options.reach),
             coordinates=options.coordinates,
             parts=parts,
+            body=_body_cells(prepared),
         )
     measured = measure(mapping, prepared, fits, options, clock.stage)
     return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found)
@@ -235,9 +236,15 @@ def _one_map(
         if not certify(control, shell, none).injective:
             control, shell = side_by_side([(control, None) for control, _ in meshes])
     reach = options.reach if reach is None else reach
-    cells, steps = prepared.cells, frame.steps
-    body = None if cells is None or steps is None else BodyCells.of(cells, steps)
     return UnfoldingMap(
         frame, control, shell, reach,
-        coordinates=options.coordinates, parts=parts, body=body,
+        coordinates=options.coordinates, parts=parts, body=_body_cells(prepared),
     )  # fmt: skip
+
+
+def _body_cells(prepared: PreparedPoints) -> BodyCells | None:
+    """Return the cells that the blocks of the bodies to unfold occupy; None without a lattice."""
+    steps = prepared.frame.steps
+    if prepared.cells is None or steps is None:
+        return None
+    return BodyCells.of(prepared.cells, steps)

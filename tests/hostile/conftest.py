@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 import geounfold as gu
 from geounfold.io import write_table
+
+# These need terminals, signals and limits that Windows does not have; test_guard.py does not.
+collect_ignore = (
+    []
+    if find_spec("pty")
+    else ["processes.py", "test_signals.py", "test_memory.py", "test_disks.py"]
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pty
 import select
 import signal
 import subprocess
@@ -12,13 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.places import ROOT
-
-pty = pytest.importorskip("pty", reason="Windows has no such terminal: see test_guard.py")
-
-IMITATION = ROOT / "tests" / "imitation"
-
-LONG = 120.0  # seconds after which a test gives up on a process; nothing is timed
+from tests.hostile.environment import LONG, with_fault
 
 UNFOLD = ("unfold", "p.csv", "-o", "out.csv", "--summary", "s.json", "--map", "m.npz")
 
@@ -31,14 +26,6 @@ def heed_stops() -> None:
     """
     for stop in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
         signal.signal(stop, signal.SIG_DFL)
-
-
-def with_fault(script: Path | None = None, **more: str) -> dict[str, str]:
-    """Return an environment in which each new Python runs a script first."""
-    if script is not None:
-        more["GEOUNFOLD_FAULT"] = str(script)
-    path = [str(IMITATION), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(path), **more}
 
 
 class Run:
@@ -95,10 +82,3 @@ class Run:
             return False
         self._text += read.decode()
         return bool(read)
-
-
-def state_of(folder: Path) -> dict[str, bytes | None]:
-    return {
-        str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None
-        for p in folder.rglob("*")
-    }

@@ -13,7 +13,8 @@ import pytest
 
 from geounfold.errors import OutputError
 from geounfold.io import Outputs
-from tests.hostile.processes import UNFOLD, Run, state_of
+from tests.hostile.environment import state_of
+from tests.hostile.processes import UNFOLD, Run
 
 
 @pytest.fixture

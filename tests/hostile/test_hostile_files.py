@@ -33,6 +33,14 @@ GOOD = H + "1,2,3\n4,5,6\n"
 POINTS = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
 
 
+def _device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+DEVICES = (os.mkfifo, _device) if hasattr(os, "mkfifo") else ()
+"""Make what is among the files but is none; Windows has no such things."""
+
+
 class Bad(NamedTuple):
     """A file, by name and content, and words of the line that refuses it."""
 
@@ -129,8 +137,7 @@ TABLES = [
     Bad("parquet, name twice", "p.parquet", _parquet(x=[1], X=[1], y=[2], z=[3]), ("ambiguous",)),
     # No files.
     Bad("folder", "p.csv", lambda path: path.mkdir(), ("is a directory",)),
-    Bad("pipe", "p.csv", os.mkfifo, ("pipe or a device",)),
-    Bad("device", "p.csv", lambda path: path.symlink_to("/dev/zero"), ("pipe or a device",)),
+    *(Bad(make.__name__, "p.csv", make, ("pipe or a device",)) for make in DEVICES),
     Bad("link to itself", "p.csv", lambda path: path.symlink_to(path), ("p.csv",)),
     Bad("link to nothing", "p.csv", lambda path: path.symlink_to("nowhere"), ("no such file",)),
 ]
@@ -368,7 +375,7 @@ def test_map(what: str, tmp_path: Path, refused: Callable[..., None]) -> None:
     assert not (tmp_path / "executed").exists()
 
 
-@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda p: p.symlink_to("/dev/zero")])
+@pytest.mark.parametrize("make", [Path.mkdir, *DEVICES])
 def test_map_that_is_no_file(make: Callable[[Path], object], tmp_path: Path) -> None:
     make(tmp_path / "m.npz")
     with pytest.raises(InputError, match=r"directory|pipe or device"):

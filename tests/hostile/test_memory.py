@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.hostile.processes import UNFOLD, Run, state_of
+from tests.hostile.environment import state_of
+from tests.hostile.processes import UNFOLD, Run
 
 MEMORY = "geounfold: error: out of memory; nothing was written\n"
 

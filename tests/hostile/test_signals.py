@@ -13,7 +13,8 @@ import pytest
 
 from geounfold.backends.system.signals import stoppable
 from geounfold.cli.process.journal import Account, Journal
-from tests.hostile.processes import LONG, UNFOLD, Run, state_of
+from tests.hostile.environment import LONG, state_of
+from tests.hostile.processes import UNFOLD, Run
 
 LINES = {
     signal.SIGINT: (130, "geounfold: error: interrupted; nothing was written\n"),

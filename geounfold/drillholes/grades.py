@@ -15,7 +15,6 @@ from geounfold.geometry.mesh import Floats
 from geounfold.io.column_values import objects
 from geounfold.io.grade_values import Capped, GradeRules, GradeValues
 from geounfold.io.messages import listing, shown
-from geounfold.io.selection import nearest_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +69,7 @@ def grade_columns(
             raise OptionError(
                 f"{table.source}: no column '{shown(name)}' for grades; it has: {listing(names)}"
             )
-    for name in rules.cap:
-        if name not in names:
-            near = nearest_name(name, names)
-            hint = f"; did you mean {shown(near)}?" if near else ";"
-            raise OptionError(
-                f"{table.source}: no column '{shown(name)}' to cap{hint} it has: {listing(names)}"
-            )
+    rules.check_columns(names, table.source)
     grades: dict[str, Floats] = {}
     words: dict[str, np.ndarray] = {}
     counts: dict[str, Mapping[str, int]] = {}

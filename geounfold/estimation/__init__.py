@@ -7,9 +7,11 @@ unfolded space and calls it. `exploration` computes the tables of exploratory da
 ``geostat``) solves the kriging systems.
 """
 
-from geounfold.estimation.estimate import Estimation, FlatSamples, estimate, flat_samples
+from geounfold.estimation.declustering import Declustering, decluster
+from geounfold.estimation.estimate import Estimation, estimate
 from geounfold.estimation.exploration import Exploration, contact, explore, histogram, swath
 from geounfold.estimation.fit import FEWEST_SAMPLES, FittedVariogram, directional, fit_variogram
+from geounfold.estimation.flat_samples import FlatSamples, flat_samples
 from geounfold.estimation.kriging import (
     FLAGS,
     METHODS,
@@ -27,6 +29,7 @@ __all__ = [
     "FLAGS",
     "KINDS",
     "METHODS",
+    "Declustering",
     "Estimates",
     "Estimation",
     "Exploration",
@@ -39,6 +42,7 @@ __all__ = [
     "conservation",
     "contact",
     "cross_validate",
+    "decluster",
     "directional",
     "estimate",
     "explore",

@@ -3,89 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from geounfold.drillholes.tables import ALIASES
-from geounfold.errors import InputError, OptionError
+from geounfold.errors import InputError, OptionError, check_number
+from geounfold.estimation.declustering import Declustering, decluster
 from geounfold.estimation.fit import FittedVariogram, fit_variogram
+from geounfold.estimation.flat_samples import FlatSamples, flat_samples, in_body
 from geounfold.estimation.kriging import (
     FLAGS,
     OUTSIDE,
+    OUTSIDE_BODY,
     Estimates,
     Method,
     cross_validate,
-    hole_numbers,
     krige,
 )
 from geounfold.estimation.neighbourhood import Neighbourhood
 from geounfold.estimation.scores import Conservation, conservation
 from geounfold.estimation.variogram import Triple, Variogram
-from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.io.coordinate_columns import numbers
-from geounfold.io.packages.names import plain_name
+from geounfold.geometry.mesh import Floats
+from geounfold.io.grade_values import GradeRules, grade_rules
 from geounfold.io.result_columns import frame_points
+from geounfold.io.selection import read_where
+from geounfold.io.tables.points import chosen_rows
 from geounfold.mapping.carried import Carried, checked_points
 
 _REACH = 2.0  # search radii in variogram ranges, if the user gives none
 _PLAIN = {"min_samples", "max_samples", "max_per_hole"}
-
-
-class Carries(Protocol):
-    """An object that carries points to the unfolded space, such as an UnfoldingMap."""
-
-    def carry(self, points: Floats, *, inverse: bool = False) -> Carried:
-        """Return the images of the points."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class FlatSamples:
-    """Samples that have a grade and an image in the unfolded space.
-
-    Attributes
-    ----------
-    points : (n, 3) float
-        Unfolded coordinates, in the map's unit.
-    folded : (n, 3) float
-        Folded coordinates, as given.
-    grades : (n,) float
-        Values of the grade, in its column's unit.
-    holes : (n,) int or None
-        Number of each sample's hole; None if the holes are not known.
-    stratigraphic : (n,) float
-        Stratigraphic height: 0 at the bottom, 1 at the top.
-    rows : (n,) int
-        Row of each sample in the table given, from 0.
-    given : int
-        Number of samples given.
-    without_grade : int
-        Number left out because the grade or a coordinate is missing.
-    outside : int
-        Number left out because they lie outside the map.
-    """
-
-    points: Floats
-    folded: Floats
-    grades: Floats
-    holes: Ints | None
-    stratigraphic: Floats
-    rows: Ints
-    given: int
-    without_grade: int
-    outside: int
-
-    def facts(self) -> dict[str, int]:
-        """Return the counts of samples given, used and left out, for a summary."""
-        return {
-            "given": self.given,
-            "used": len(self.grades),
-            "without_grade": self.without_grade,
-            "outside_map": self.outside,
-        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +58,11 @@ class Estimation:
         Result of the fit; None if the user gave the variogram.
     neighbourhood : Neighbourhood
         Search neighbourhood in the unfolded space.
+    declustering : Declustering or None
+        Weights of the samples; None if the user asked for none.
+    body_known : bool
+        Whether the map holds the body's own blocks. Without them, blocks and samples inside the
+        control mesh between bottom and top count as the body's.
     """
 
     grade: str
@@ -120,16 +73,19 @@ class Estimation:
     variogram: Variogram | None
     fitted: FittedVariogram | None
     neighbourhood: Neighbourhood
+    declustering: Declustering | None = None
+    body_known: bool = True
 
     @property
     def columns(self) -> dict[str, Any]:
-        """The results by column name: the grade with _estimate, _variance, _samples or _flag."""
+        """The results by column name: the grade with _estimate ... _flag, and location."""
         b = self.blocks
         return {
             f"{self.grade}_estimate": b.estimate,
             f"{self.grade}_variance": b.variance,
             f"{self.grade}_samples": b.samples,
             f"{self.grade}_flag": b.flag,
+            "location": self.carried.location,
         }
 
     @property
@@ -160,17 +116,21 @@ class Estimation:
 
     def warnings(self) -> list[str]:
         """Return one line for each group of samples left out or blocks not estimated."""
-        s, counts = self.samples, self.blocks.counts()
-        lines = []
-        if s.without_grade:
-            lines.append(f"{s.without_grade} of {s.given} samples have no {self.grade}: left out")
-        if s.outside:
-            lines.append(f"{s.outside} of {s.given} samples lie outside the map: left out")
+        counts = self.blocks.counts()
+        lines = self.samples.warnings(self.grade)
+        more = {OUTSIDE_BODY: "; --all-blocks estimates them too"}
         lines += [
             f"{counts[flag]} of {len(self.blocks.flag)} blocks are not estimated: {flag}"
+            f"{more.get(flag, '')}"
             for flag in FLAGS[1:]
             if counts[flag]
         ]
+        if not self.body_known and (counts[OUTSIDE_BODY] or self.samples.wall_rock):
+            lines.append(
+                "the map does not hold the body's blocks: what lies inside its control mesh, "
+                "between bottom and top, counts as the body's, some of it beyond the rim; unfold "
+                "again with --map"
+            )
         return lines
 
     def summary(self) -> dict[str, Any]:
@@ -194,12 +154,13 @@ class Estimation:
             "samples": self.samples.facts(),
             "blocks": {"given": len(v), **self.blocks.counts()},
             "mean_of_samples": float(self.samples.grades.mean()),
+            "declustered": None if self.declustering is None else self.declustering.facts(),
             "mean_of_blocks": float(known.mean()) if len(known) else None,
             "warnings": self.warnings(),
         }
 
 
-def estimate(  # 11 arguments: a public name; seven of them are choices by keyword
+def estimate(  # 17 arguments: a public name; thirteen of them are choices by keyword
     unfolding: Any,
     samples: pd.DataFrame,
     blocks: pd.DataFrame | Floats | None = None,
@@ -212,6 +173,12 @@ def estimate(  # 11 arguments: a public name; seven of them are choices by keywo
     mean: float | None = None,
     power: float = 2.0,
     workers: int = 1,
+    where: str | None = None,
+    samples_where: str | None = None,
+    values: GradeRules | Mapping[str, Any] | None = None,
+    soft_boundary: float = 0.0,
+    all_blocks: bool = False,
+    cells: Any = None,
 ) -> Estimation:
     """Estimate a grade on folded blocks from folded samples, in the unfolded space.
 
@@ -241,6 +208,19 @@ def estimate(  # 11 arguments: a public name; seven of them are choices by keywo
         Power of inverse distance.
     workers : int
         Number of processes at a time.
+    where, samples_where : str, optional
+        Choose rows of `blocks` and `samples`, such as ``"ROCK=ORE"``. The answer has the rows
+        chosen alone.
+    values : GradeRules or mapping, optional
+        How the grade's values are read: ``missing`` codes, ``below_detection``, ``cap``.
+    soft_boundary : float
+        Largest distance from the body, in blocks, of samples that are used. The default leaves
+        out samples in wall rock.
+    all_blocks : bool
+        Whether blocks outside the body are estimated too, as far as the map reaches.
+    cells : (float, float, float) or "auto", optional
+        Sides of the cells that weigh clustered samples, in the unfolded space (`decluster`). The
+        weights are for statistics, and for the mean of simple kriging.
 
     Returns
     -------
@@ -258,89 +238,55 @@ def estimate(  # 11 arguments: a public name; seven of them are choices by keywo
         gstlearn is not installed (extra ``geostat``).
     """
     carrier = getattr(unfolding, "map", unfolding)
-    flat = flat_samples(carrier, samples, grade=grade, hole=hole)
+    check_number("soft_boundary", soft_boundary, 0)
+    flat = flat_samples(
+        carrier, _rows(samples, samples_where, "the samples"),
+        grade=grade, hole=hole, rules=grade_rules(values), soft_boundary=soft_boundary,
+        source=str(samples.attrs.get("source", "the samples")),
+    )  # fmt: skip
+    weighed = None if cells is None else decluster(flat.points, flat.grades, cells)
     if blocks is None:
         carried = getattr(unfolding, "carried", None)
         if carried is None:
             raise InputError("a map holds no blocks: give their centroids")
     else:
-        carried = carrier.carry(_points(blocks))
+        centres = _points(_rows(blocks, where, "the blocks"))
+        carried = carrier.carry(centres)
+    own = np.ones(len(carried.points), dtype=bool)
+    if blocks is not None and not all_blocks:
+        own = in_body(carrier, centres, carried)
+    if weighed is not None and method == "simple" and mean is None:
+        mean = weighed.mean
     fitted = None
     if variogram is None and (method != "inverse_distance" or _needs_radii(neighbourhood)):
         fitted = fit_variogram(flat.points, flat.grades)
         variogram = fitted.model
     near = _neighbourhood(neighbourhood, variogram, flat.points)
+    targets = np.where(own[:, None], carried.points, np.nan)
     found = krige(
-        flat.points, flat.grades, carried.points, variogram, near,
+        flat.points, flat.grades, targets, variogram, near,
         method=method, holes=flat.holes, mean=mean, power=power, workers=workers,
     )  # fmt: skip
+    reached = np.isfinite(carried.points).all(axis=1)
+    found = replace(found, flag=np.where(reached & ~own, OUTSIDE_BODY, found.flag))
     if method == "inverse_distance":
         variogram = fitted = None
-    return Estimation(grade, found, carried, flat, method, variogram, fitted, near)
+    known = getattr(carrier, "body", None) is not None
+    return Estimation(grade, found, carried, flat, method, variogram, fitted, near, weighed, known)
 
 
-def flat_samples(
-    carrier: Carries, samples: pd.DataFrame, *, grade: str, hole: str | None = None
-) -> FlatSamples:
-    """Return the samples that have a grade and an image, in the unfolded space.
-
-    Raises
-    ------
-    InputError
-        The column is missing, its values are not numbers, or no sample is left.
-    """
-    P = frame_points(samples)
-    values = numbers(_column(samples, grade))
-    graded: Bools = np.isfinite(values)
-    holes = _holes(samples, hole)
-    there = graded & np.isfinite(P).all(axis=1)
-    rows = np.flatnonzero(there)
-    if not len(rows):
-        raise InputError(f"no sample has a value of '{grade}' and coordinates")
-    carried = carrier.carry(checked_points(P[rows]))
-    inside = np.isfinite(carried.points).all(axis=1)
-    if not inside.any():
-        raise InputError(
-            f"none of the {len(rows)} samples lies within the map's reach: check that samples and "
-            "blocks have the same coordinates and unit"
-        )
-    kept = rows[inside]
-    return FlatSamples(
-        points=carried.points[inside],
-        folded=P[kept],
-        grades=values[kept],
-        holes=None if holes is None else holes[kept],
-        stratigraphic=carried.stratigraphic[inside],
-        rows=kept,
-        given=len(samples),
-        without_grade=int(len(samples) - len(rows)),
-        outside=int(np.count_nonzero(~inside)),
-    )
+def _rows(given: Any, where: str | None, source: str) -> Any:
+    """Return the rows of a DataFrame that an expression chooses."""
+    if where is None:
+        return given
+    if not isinstance(given, pd.DataFrame):
+        raise InputError(f"where chooses rows by columns: give {source} as a DataFrame")
+    return given.loc[chosen_rows(read_where(where), given, source)]
 
 
 def _points(blocks: pd.DataFrame | Floats) -> Floats:
     P = frame_points(blocks) if isinstance(blocks, pd.DataFrame) else blocks
     return checked_points(P)
-
-
-def _column(frame: pd.DataFrame, name: str) -> pd.Series:
-    where = [k for k, column in enumerate(frame.columns) if str(column) == name]
-    if len(where) != 1:
-        what = "no" if not where else "more than one"
-        words = ", ".join(str(c) for c in frame.columns[:20])
-        raise InputError(f"the samples have {what} column '{name}'; columns: {words}")
-    return frame.iloc[:, where[0]]
-
-
-def _holes(frame: pd.DataFrame, name: str | None) -> Ints | None:
-    """Return the number of each sample's hole; None if no single column names the hole."""
-    if name is None:
-        aliases = ALIASES["assay"]["hole"]
-        found = [str(column) for column in frame.columns if plain_name(column) in aliases]
-        if len(found) != 1:
-            return None
-        name = found[0]
-    return hole_numbers(_column(frame, name).to_numpy(dtype=object))
 
 
 def _needs_radii(given: Neighbourhood | Mapping[str, Any] | None) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError, OptionError
-from geounfold.estimation.estimate import FlatSamples, flat_samples
 from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
+from geounfold.estimation.flat_samples import FlatSamples, flat_samples
 from geounfold.geometry.mesh import Floats, Ints
 
 

@@ -22,13 +22,14 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 Method = Literal["ordinary", "simple", "inverse_distance"]
 METHODS: tuple[str, ...] = get_args(Method)
 
-ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE = (
+ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE, OUTSIDE_BODY = (
     "estimated",
     "too_few_samples",
     "outside_map",
     "unsolvable",
+    "outside_body",
 )
-FLAGS = (ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE)
+FLAGS = (ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE, OUTSIDE_BODY)
 """Outcome of a target: estimated, or the reason why not."""
 
 _CHUNK = 8_192  # targets looked up at a time; a multiple of the targets of one call
@@ -48,7 +49,7 @@ class Estimates:
     samples : (m,) int
         Number of samples found around each target.
     flag : (m,) str
-        estimated, too_few_samples, outside_map or unsolvable.
+        estimated, too_few_samples, outside_map, unsolvable or outside_body.
     """
 
     estimate: Floats

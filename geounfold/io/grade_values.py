@@ -7,7 +7,7 @@ never as zero, and is told.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,8 @@ from geounfold.errors import InputError, OptionError, check_one_of
 from geounfold.geometry.mesh import Bools, Floats
 from geounfold.io.column_values import objects
 from geounfold.io.coordinate_columns import number_hint, readable_numbers
-from geounfold.io.messages import shown
+from geounfold.io.messages import listing, shown
+from geounfold.io.selection import nearest_name
 
 BELOW_DETECTION = ("missing", "half", "zero")
 
@@ -83,6 +84,16 @@ class GradeRules:
         values = np.where(declared, np.nan, values)
         values = np.where(below, _SHARE[self.below_detection] * limits, values)
         return GradeValues(values, declared, below, wrong & ~declared & ~below, self)
+
+    def check_columns(self, names: Sequence[str], source: str) -> None:
+        """Raise OptionError if a cap names a column that is no grade of a table."""
+        for name in self.cap:
+            if name not in names:
+                near = nearest_name(name, names)
+                hint = f"; did you mean {shown(near)}?" if near else ";"
+                raise OptionError(
+                    f"{source}: no column '{shown(name)}' to cap{hint} grades: {listing(names)}"
+                )
 
     def _declared(self, column: pd.Series, values: Floats) -> Bools:
         """Return which values mean no value."""

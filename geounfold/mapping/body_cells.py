@@ -15,6 +15,7 @@ from geounfold.errors import InputError
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 _MOST = 1 << 28  # cells of the body's box; more are not kept: 32 MB of bits, 256 MB unpacked
+_NEAR = 32  # cells with the nearest centres, among which the one with the nearest face is sought
 _FACE = 1e-6  # of a cell: points this near to a face lie in the cells on both sides
 
 
@@ -103,6 +104,14 @@ class BodyCells:
             for move in (-1, 1):
                 core &= np.roll(padded, move, axis)[1:-1, 1:-1, 1:-1]
         return cKDTree(np.argwhere(self._filled & ~core) + self.lowest)
+
+    def gap(self, work: Floats) -> Floats:
+        """Return the length from points (n, 3), working units, to the body, (n,); 0 inside."""
+        cells = self._tree.data * self.steps
+        near = cKDTree(cells).query(work, k=min(_NEAR, len(cells)))[1].reshape(len(work), -1)
+        apart = np.abs(work[:, None] - cells[near]) - 0.5 * self.steps
+        length = np.linalg.norm(np.maximum(apart, 0.0), axis=2).min(axis=1)
+        return np.asarray(np.where(self.hold(work), 0.0, length))
 
     def distance(self, work: Floats) -> Floats:
         """Return how far points (n, 3), working units, lie from the body, in blocks, (n,).

@@ -31,6 +31,8 @@ REACH = 3.0
 
 _SLICE = 1 << 14  # points that a thread carries at a time; they fit in its cache
 
+_BEYOND = 0.02  # height beyond bottom and top that counts as the body's, without its blocks
+
 _MISSED = 1 << 18  # points that libigl places at a time
 
 
@@ -351,8 +353,9 @@ class UnfoldingMap:
         """Return which folded points (n, 3) lie in the body's own blocks.
 
         A map without the blocks (of scattered points, or saved by an older version) has points
-        inside the control mesh between the bottom and the top surface instead. The control mesh
-        reaches beyond the body's rim, so that these are too many.
+        inside the control mesh between the bottom and the top surface instead, by 0.02 beyond
+        them: the blocks of the common body reach from -0.018 to 1.018. The control mesh reaches
+        beyond the body's rim, so that these are too many.
 
         Parameters
         ----------
@@ -364,17 +367,19 @@ class UnfoldingMap:
         if self.body is not None:
             return self.body.hold(self.frame.to_work(points))
         with np.errstate(invalid="ignore"):
-            between = (carried.stratigraphic >= 0) & (carried.stratigraphic <= 1)
+            between = np.abs(carried.stratigraphic - 0.5) <= 0.5 + _BEYOND
         return np.asarray(carried.inside & between)
 
     def body_distance(self, points: Floats, carried: Carried) -> Floats:
         """Return how far folded points (n, 3) lie from the body, in blocks, (n,); 0 inside.
 
-        See `BodyCells.distance`; without the blocks, it is the distance from the control mesh.
+        See `BodyCells.distance`. Without the blocks, it is the distance from the control mesh, and
+        half a block if a point inside the mesh does not lie in the body.
         """
         if self.body is not None:
             return self.body.distance(self.frame.to_work(points))
-        return np.asarray(carried.distance / self.frame.scale)
+        away = np.maximum(carried.distance / self.frame.scale, 0.5)
+        return np.where(self.in_body(points, carried), 0.0, away)
 
     def to_flat(self, points: Floats, fault_block: Ints | None = None) -> Floats:
         """Return folded points (n, 3) in the flat space, same unit; NaN beyond the reach."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import geounfold as gu
 from geounfold.cli import main
 from geounfold.synthetic import GradeField, drill
+from tests.shapes import grid_cells
 
 pytest.importorskip("gstlearn", reason="the extra geostat is not installed")
 
@@ -43,7 +45,8 @@ def test_blocks_come_back_with_estimates(files, tmp_path: Path) -> None:
     more = ("--summary", str(summary), "--cross-validate", "--max-per-hole", "6", "--quiet")
     assert main(words(files, out, *more)) == 0
     blocks, got = pd.read_csv(files["blocks.csv"]), pd.read_csv(out)
-    assert list(got) == [*blocks, "CU_estimate", "CU_variance", "CU_samples", "CU_flag"]
+    results = ("CU_estimate", "CU_variance", "CU_samples", "CU_flag", "location")
+    assert list(got) == [*blocks, *results]
     assert (got.CU_estimate.notna() == (got.CU_flag == "estimated")).all()
     told = json.loads(summary.read_text(encoding="utf-8"))
     assert told["blocks"]["given"] == len(blocks)
@@ -112,3 +115,163 @@ def test_an_output_is_not_replaced(files, tmp_path: Path, capsys) -> None:
     assert main(words(files, out)) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert out.read_text(encoding="utf-8") == "mine"
+
+
+# ------------------------------------------------- whole models, wall rock, values as they stand
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder: the map of an arch of blocks, a model with waste around it, samples."""
+    folder = tmp_path_factory.mktemp("model")
+    cells = grid_cells(24, 10, 4)
+    cells[:, 2] += 3 - np.abs(cells[:, 0] - 12) // 4
+    gu.unfold(cells * 10.0).save(folder / "m.npz")
+    own = {tuple(cell) for cell in cells.tolist()}
+    box = grid_cells(30, 16, 16) - 3
+    frame = pd.DataFrame(box * 10.0, columns=list("xyz"))
+    frame["ROCK"] = ["ORE" if tuple(cell) in own else "WASTE" for cell in box.tolist()]
+    frame.to_csv(folder / "full.csv", index=False)
+    # A hole through every third column, down through the ore (1 g/t) into barren wall rock.
+    at = grid_cells(8, 3, 20) * [30.0, 30.0, 5.0] + [0, 0, -15.0]
+    at = at[np.abs(at[:, 2] % 10 - 5) > 0]  # not on the face of a block
+    ore = [tuple(np.rint(p / 10).astype(int)) in own for p in at]
+    samples = pd.DataFrame(at, columns=list("xyz")).assign(AU=np.where(ore, 1.0, 0.0), ORE=ore)
+    samples["hole"] = [f"{x:.0f}/{y:.0f}" for x, y in at[:, :2]]
+    samples.to_csv(folder / "s.csv", index=False)
+    return folder
+
+
+def estimated(model: Path, out: Path, *more: str, samples: str = "s.csv") -> list[str]:
+    inputs = [str(model / "m.npz"), str(model / samples), str(model / "full.csv")]
+    how = ["--method", "inverse_distance", "--radii", "60,60,60"]
+    return ["estimate", *inputs, "-o", str(out), "--grade", "AU", *how, *more]
+
+
+def test_waste_of_a_whole_model_is_not_estimated(model, tmp_path: Path, capsys) -> None:
+    assert main(estimated(model, tmp_path / "o.csv")) == 0
+    got = pd.read_csv(tmp_path / "o.csv")
+    waste = got["ROCK"] == "WASTE"
+    assert set(got.loc[~waste, "AU_flag"]) == {"estimated"}
+    assert set(got.loc[waste, "AU_flag"]) == {"outside_body", "outside_map"}
+    assert got.loc[waste, "AU_estimate"].isna().all()
+    assert set(got["location"]) == {"inside", "extrapolated", "outside"}
+    said = capsys.readouterr().err
+    assert "blocks are not estimated: outside_body; --all-blocks estimates them too" in said
+    assert main(estimated(model, tmp_path / "all.csv", "--all-blocks")) == 0
+    every = pd.read_csv(tmp_path / "all.csv")
+    assert set(every.loc[every["location"] != "outside", "AU_flag"]) == {
+        *("estimated", "too_few_samples")
+    }
+    assert every.loc[waste, "AU_estimate"].notna().any()
+    assert main(estimated(model, tmp_path / "w.csv", "--where", "ROCK=ORE")) == 0
+    chosen = pd.read_csv(tmp_path / "w.csv")
+    assert set(chosen.loc[waste, "location"]) == {"not selected"}
+    pd.testing.assert_series_equal(chosen["AU_estimate"], got["AU_estimate"])
+
+
+def test_samples_in_wall_rock_are_left_out(model, tmp_path: Path, capsys) -> None:
+    s = str(tmp_path / "s.json")
+    assert main(estimated(model, tmp_path / "o.csv", "--summary", s)) == 0
+    ore = pd.read_csv(model / "s.csv")["ORE"]
+    facts = json.loads(Path(s).read_text())
+    assert facts["samples"]["used"] == ore.sum()
+    assert facts["samples"]["outside_body"] + facts["samples"]["outside_map"] == (~ore).sum()
+    assert facts["mean_of_blocks"] == 1.0  # every sample of ore is 1 g/t
+    assert "samples lie outside the body (wall rock): left out" in capsys.readouterr().err
+    more = ("--summary", s, "--overwrite", "--soft-boundary", "1")
+    assert main(estimated(model, tmp_path / "o.csv", *more)) == 0
+    soft = json.loads(Path(s).read_text())
+    assert soft["samples"]["soft_boundary"] > 0
+    assert soft["mean_of_blocks"] < 1
+
+
+def test_samples_that_all_lie_outside_are_an_error(model, tmp_path: Path, capsys) -> None:
+    far = pd.read_csv(model / "s.csv")
+    far["z"] = 130.0  # the highest blocks end at z = 65: their centres lie at 60
+    far.to_csv(tmp_path / "far.csv", index=False)
+    words = estimated(model, tmp_path / "o.csv")
+    words[2] = str(tmp_path / "far.csv")
+    assert main(words) == 2
+    # Of holes at y = 0; the blocks under x = 90, 120 and 150 are equally high.
+    said = capsys.readouterr().err
+    assert re.search(r"the nearest, at \(\d+, 0, 130\), is 65 \(6.5 blocks\) away", said)
+
+
+@pytest.mark.parametrize(
+    ("word", "more", "used"),
+    [
+        ("-", (), 1),
+        ("<0.01", (), 1),
+        ("<0.01", ("--below-detection", "half"), 0),
+        ("-99", ("--missing", "-99,-999,-"), 1),
+    ],
+)
+def test_codes_in_samples_are_read_as_in_assays(
+    word: str, more: tuple[str, ...], used: int, model, tmp_path: Path, capsys
+) -> None:
+    samples = pd.read_csv(model / "s.csv", dtype=str)
+    first = samples.index[samples["ORE"] == "True"][0]
+    samples.loc[first, "AU"] = word
+    samples.to_csv(model / "codes.csv", index=False)
+    s = str(tmp_path / "s.json")
+    words = estimated(model, tmp_path / "o.csv", "--summary", s, *more, samples="codes.csv")
+    assert main(words) == 0
+    facts = json.loads(Path(s).read_text())
+    assert facts["samples"]["without_grade"] == used
+    assert pd.read_csv(tmp_path / "o.csv")["AU_estimate"].min() >= 0
+    said = capsys.readouterr().err
+    assert (f"the first '{word}' at data row {first + 1}" in said) != (word == "-99")
+
+
+def test_negative_grades_are_told_and_words_are_refused(model, tmp_path: Path, capsys) -> None:
+    samples = pd.read_csv(model / "s.csv", dtype=str)
+    ore = samples["ORE"] == "True"
+    samples.loc[samples.index[ore][0], "AU"] = "-99"
+    samples.to_csv(model / "codes.csv", index=False)
+    assert main(estimated(model, tmp_path / "o.csv", samples="codes.csv")) == 0
+    assert "1 of" in (said := capsys.readouterr().err)
+    assert "values is negative, the first '-99'" in said
+    samples["AU"] = np.where(np.arange(len(samples)) % 3, "BDL", samples["AU"])
+    samples.to_csv(model / "codes.csv", index=False)
+    assert main(estimated(model, tmp_path / "p.csv", samples="codes.csv")) == 2
+    said = capsys.readouterr().err
+    assert "codes.csv: column 'AU' is a grade, but" in said
+    assert "the first 'BDL' at data row 2" in said
+
+
+def test_caps_and_declustering_are_in_the_summary(model, tmp_path: Path, capsys) -> None:
+    samples = pd.read_csv(model / "s.csv")
+    ore = samples.index[samples["ORE"]]
+    samples.loc[ore[0], "AU"] = 50.0
+    cluster = samples.loc[[ore[0]] * 20].assign(x=lambda f: f["x"] + np.linspace(-1, 1, 20))
+    pd.concat([samples, cluster]).to_csv(model / "codes.csv", index=False)
+    s = str(tmp_path / "s.json")
+    more = ("--cap", "AU=5", "--decluster", "30,30,30", "--summary", s)
+    assert main(estimated(model, tmp_path / "o.csv", *more, samples="codes.csv")) == 0
+    facts = json.loads(Path(s).read_text())
+    cap = facts["samples"]["values"]["cap"]
+    assert (cap["changed"], cap["value"]) == (21, 5)
+    assert cap["mean_after"] < cap["mean_before"]
+    assert pd.read_csv(tmp_path / "o.csv")["AU_estimate"].max() <= 5
+    found = facts["declustered"]
+    assert 1 < found["mean"] < found["plain_mean"] == facts["mean_of_samples"]
+    assert "AU was capped at 5: 21 of" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--soft-boundary", "-1"), "--soft-boundary needs 0 or more blocks"),
+        (("--decluster", "0,1,1"), "--decluster needs sides above 0"),
+        (("--cap", "AU"), "--cap needs COLUMN=VALUE"),
+        (("--cap", "AU=px"), "--cap: the cap of AU must be a number or a percentile"),
+        (("--cap", "CU=3"), "no column 'CU' to cap"),
+        (("--below-detection", "none"), "--below-detection must be one of missing, half, zero"),
+    ],
+)
+def test_options_for_values_are_checked(
+    more: tuple[str, ...], message: str, model, tmp_path: Path, capsys
+) -> None:
+    assert main(estimated(model, tmp_path / "o.csv", *more)) == 2
+    assert message in capsys.readouterr().err

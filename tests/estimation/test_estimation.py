@@ -304,7 +304,13 @@ def test_estimates_in_the_unfolded_space_are_those_in_the_truth(drilled) -> None
     # The same rules in the true flat space are the ceiling: 1 % is far more than the map's error.
     assert ours.rmse < 1.01 * best.rmse
     assert got.columns["grade_estimate"] is got.blocks.estimate
-    assert got.summary()["samples"]["used"] == len(samples)
+    counted = got.summary()["samples"]
+    assert counted["used"] + counted["outside_body"] == len(samples)
+    # Middles outside the body, by its truth and by the map: a few of them lie on a surface.
+    assert counted["outside_body"] / len(samples) == pytest.approx(1 - there.mean(), abs=0.02)
+    every = estimate(u, samples, grade="grade", soft_boundary=1.0)
+    assert every.summary()["samples"]["used"] == len(samples)
+    assert every.samples.let_in == counted["outside_body"]
     assert score(got.samples.grades, got.cross_validation().estimate).correlation > 0.3
 
 
@@ -327,13 +333,12 @@ def test_samples_left_out_are_counted(drilled) -> None:
     odd = samples.copy()
     odd.loc[0, "grade"] = np.nan
     odd.loc[1, "x"] += 1e6
-    got = estimate(u.map, odd, u.folded[:50], grade="grade", method="inverse_distance")
-    assert got.samples.facts() == {
-        "given": len(odd),
-        "used": len(odd) - 2,
-        "without_grade": 1,
-        "outside_map": 1,
-    }
+    how = {"grade": "grade", "method": "inverse_distance", "soft_boundary": 1.0}
+    got = estimate(u.map, odd, u.folded[:50], **how)
+    facts = got.samples.facts()
+    assert [facts[n] for n in ("given", "used", "without_grade", "outside_map")] == [
+        *(len(odd), len(odd) - 2, 1, 1)
+    ]
     assert any("no grade" in line for line in got.warnings())
     assert any("outside the map" in line for line in got.warnings())
 

@@ -33,6 +33,8 @@ def test_distances_are_counted_in_blocks_along_the_axes() -> None:
     points = np.array([[0, 0, 0], [5.0, 0, 0], [0, 2.0, 0], [0, 1.5, 1.25]])
     # Beyond the face: 2 m of blocks of 2 m, 1.5 of 1 m; of two axes the larger (2 and 1 blocks).
     np.testing.assert_allclose(body().distance(points), [0, 1, 1.5, 2])
+    # As a length: 2 m, 1.5 m, and 1 m beside 1 m above.
+    np.testing.assert_allclose(body().gap(points), [0, 2, 1.5, np.sqrt(2)])
 
 
 def test_a_random_body_against_every_cell() -> None:

@@ -18,7 +18,10 @@ results, for a grade CU:
   CU_estimate      at the block's centroid, as a point; empty if there is none
   CU_variance      kriging variance, in the grade's unit squared
   CU_samples       number of samples used
-  CU_flag          estimated, too_few_samples, outside_map or unsolvable
+  CU_flag          estimated, too_few_samples, outside_map, outside_body or
+                   unsolvable
+  location         of the block: inside the control mesh, extrapolated around
+                   it, or outside
 
 SAMPLES and BLOCKS are in the folded space; the map carries both. The variogram
 and the search are in the unfolded space: the first two axes lie in the layer,
@@ -75,10 +78,32 @@ def add_estimate(commands: Any) -> Parser:
         metavar="V.json",
         help="a model, or a summary that holds one (default: fitted)",
     )
+    group.add(
+        "--decluster",
+        metavar="X,Y,Z",
+        help="cells that weigh clustered samples in statistics: sides, or auto",
+    )
     group.add("--mean", metavar="X", help="mean for simple kriging (default: that of SAMPLES)")
     group.add("--power", metavar="X", default="2", help="power of inverse distance (default 2)")
     group.add("--workers", metavar="N", default="1", help="number of processes (default 1)")
+    _add_search(parser)
+    return parser
+
+
+def _add_search(parser: Parser) -> None:
+    """Add the options that choose samples and blocks."""
     group = parser.section("search")
+    group.add(
+        "--soft-boundary",
+        metavar="B",
+        default="0",
+        help="use samples outside the body too, within B blocks of it (default 0)",
+    )
+    group.add(
+        "--all-blocks",
+        action="store_true",
+        help="estimate blocks outside the body too, as far as the map reaches",
+    )
     group.add(
         "--radii",
         metavar="A,B,C",
@@ -92,4 +117,3 @@ def add_estimate(commands: Any) -> Parser:
     group.add("--min-samples", metavar="N", help="fewest samples of an estimate (default 4)")
     group.add("--max-samples", metavar="N", help="most samples of an estimate (default 24)")
     group.add("--max-per-hole", metavar="N", help="most samples of one hole (default: no limit)")
-    return parser

@@ -14,7 +14,7 @@ from geounfold.cli.inputs.block_sizes import columns_or_lengths
 from geounfold.cli.inputs.model_frame import model_axes, model_frame
 from geounfold.cli.inputs.numbers import whole_number
 from geounfold.cli.inputs.points import read_table, where_of
-from geounfold.cli.inputs.values import read_grade
+from geounfold.cli.inputs.values import read_grade, values_rules
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, PointTable, write_json
@@ -59,7 +59,9 @@ def run(args: Namespace, console: Console) -> None:
     ))  # fmt: skip
     names = _value_columns(args.values, source)
     target.check_writable(args.output)
-    values = np.column_stack([read_grade(source, name, args, console) for name in names])
+    rules = values_rules(args)
+    rules.check_columns(names, source.source)
+    values = np.column_stack([read_grade(source, name, args, console, rules) for name in names])
     axes = model_axes(args.rotation) if frame is None else frame.axes
     from geounfold.estimation.transfer import transfer
     from geounfold.mapping import mesh_map

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from geounfold.cli.inputs.numbers import number, three_numbers, whole_number
+from geounfold.cli.inputs.values import values_rules
 from geounfold.errors import InputError, OptionError
 from geounfold.io.paths import existing_file
 
@@ -41,6 +42,10 @@ def estimation(
     mean = None if args.mean is None else number(args.mean, "--mean")
     power = number(args.power, "--power")
     workers = whole_number(args.workers, "--workers")
+    soft = number(args.soft_boundary, "--soft-boundary")
+    if soft < 0:
+        raise OptionError(f"--soft-boundary needs 0 or more blocks, not '{args.soft_boundary}'")
+    cells = _cells(args.decluster)
     variogram = None if args.variogram is None else _variogram(args.variogram)
     from geounfold.estimation import estimate
     from geounfold.mapping import mesh_map
@@ -50,7 +55,8 @@ def estimation(
     return estimate(
         saved, _table(samples, args), blocks.points, variogram,
         grade=args.grade, method=args.method, neighbourhood=near,
-        mean=mean, power=power, workers=workers,
+        mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
+        soft_boundary=soft, all_blocks=args.all_blocks,
     )  # fmt: skip
 
 
@@ -73,14 +79,26 @@ def _table(samples: PointTable, args: Namespace) -> pd.DataFrame:
     """Return the samples' coordinates, grade and holes as one table."""
     if args.grade in (*samples.columns, *"xyz", "hole"):
         raise OptionError(f"--grade {args.grade} names a coordinate or the holes")
-    grade = samples.numbers(args.grade)
+    grade = samples.column(args.grade)
     columns: dict[str, Any] = dict(zip("xyz", samples.points.T, strict=True))
     hole = args.hole or _hole(samples)
     if hole is not None:
         if list(samples.frame.columns).count(hole) != 1:
             raise InputError(f"{samples.source}: no column '{hole}', or more than one")
         columns["hole"] = samples.frame[hole].to_numpy()
-    return pd.DataFrame({**columns, args.grade: grade})
+    table = pd.DataFrame({**columns, args.grade: grade.to_numpy(dtype=object)})
+    table.attrs["source"] = samples.source
+    return table
+
+
+def _cells(text: str | None) -> tuple[float, float, float] | str | None:
+    """Return the sides of --decluster, auto, or None."""
+    if text is None or text == "auto":
+        return text
+    sides = three_numbers(text, "--decluster", "50,50,10")
+    if min(sides) <= 0:
+        raise OptionError(f"--decluster needs sides above 0, or auto, not '{text}'")
+    return sides
 
 
 def _hole(samples: PointTable) -> str | None:

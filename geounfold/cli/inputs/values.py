@@ -45,7 +45,13 @@ def values_rules(args: Namespace) -> GradeRules:
         raise OptionError(f"--cap: {error}") from error
 
 
-def read_grade(table: PointTable, name: str, args: Namespace, console: Console) -> Floats:
+def read_grade(
+    table: PointTable,
+    name: str,
+    args: Namespace,
+    console: Console,
+    rules: GradeRules | None = None,
+) -> Floats:
     """Return a table's grade, (n,), by the rules of the options; what is unusual is told.
 
     Raises
@@ -55,7 +61,7 @@ def read_grade(table: PointTable, name: str, args: Namespace, console: Console) 
     """
     from geounfold.io.grade_values import grade_of
 
-    values, lines, _ = grade_of(table.column(name), table.source, values_rules(args))
+    values, lines, _ = grade_of(table.column(name), table.source, rules or values_rules(args))
     for line in lines:
         console.warn(line)
     return values

@@ -67,6 +67,7 @@ class FakeUnfolding(FakeMap):
 
 def replace_module(monkeypatch: pytest.MonkeyPatch, name: str, **members: Any) -> None:
     home, _, leaf = name.rpartition(".")
+    parent = import_module(f"geounfold.{home}".rstrip("."))
     fake = SimpleNamespace(**members)
     monkeypatch.setitem(sys.modules, f"geounfold.{name}", fake)
-    monkeypatch.setattr(import_module(f"geounfold.{home}".rstrip(".")), leaf, fake, raising=False)
+    monkeypatch.setattr(parent, leaf, fake, raising=False)

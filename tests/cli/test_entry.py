@@ -103,8 +103,8 @@ def test_failing_last_output_leaves_none(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    replace_module(monkeypatch, "report", write_report=_raise(error))
     replace_module(monkeypatch, "report.plots.rendering", check_rendering=lambda: None)
+    replace_module(monkeypatch, "report", write_report=_raise(error))
     assert main(["unfold", "p.csv", "-o", "out.csv", "--report", "r.html"]) in (2, 130)
     assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [points]

@@ -4,7 +4,7 @@ Takes plain arrays and the dict of the summary, so that it can be written again 
 page loads nothing from elsewhere and follows the reader's light or dark setting.
 """
 
-from geounfold.report.faults import CarriedFaults
+from geounfold.report.faults import CarriedFaults, carried_faults
 from geounfold.report.page import report_html, write_report
 from geounfold.report.payload import CarriedHoles, CarriedPoints
 from geounfold.report.verdict import Verdict, verdict
@@ -14,6 +14,7 @@ __all__ = [
     "CarriedHoles",
     "CarriedPoints",
     "Verdict",
+    "carried_faults",
     "report_html",
     "verdict",
     "write_report",

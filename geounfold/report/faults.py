@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import pandas as pd
 
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Bools, Floats, Ints
@@ -15,7 +16,7 @@ from geounfold.report.columns import by_number
 from geounfold.report.html_text import mapping, section, table, text
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from geounfold.unfolding.result import Unfolding
 
 SLIP_COLUMNS = (
     *("fault", "footwall_block", "hanging_wall_block", "stratigraphic"),
@@ -70,6 +71,27 @@ class CarriedFaults:
         """
         infix = "unfolded_" if space == "unfolded" else ""
         return self.slips[[f"{wall}_{infix}{axis}" for axis in "xyz"]].to_numpy(np.float64)
+
+
+def carried_faults(unfolding: Unfolding) -> CarriedFaults | None:
+    """Return an unfolded body's faults as the report shows them; None if it has none.
+
+    Places on both walls are carried into flat space by their own fault block.
+    """
+    surfaces, slips = unfolding.fault_surfaces, unfolding.slips
+    if not surfaces:
+        return None
+    if not len(slips):
+        slips = pd.DataFrame({name: np.empty(0) for name in SLIP_COLUMNS})
+        return CarriedFaults(surfaces, slips)
+    flat: dict[str, Floats] = {}
+    for wall, block in (("foot", "footwall_block"), ("hanging", "hanging_wall_block")):
+        places = slips[[f"{wall}_{axis}" for axis in "xyz"]].to_numpy(np.float64)
+        image = unfolding.to_flat(places, slips[block].to_numpy())
+        flat |= {f"{wall}_unfolded_{axis}": image[:, k] for k, axis in enumerate("xyz")}
+    slips = slips.assign(**flat)
+    kept = np.isfinite(slips[list(flat)].to_numpy()).all(axis=1)
+    return CarriedFaults(surfaces, slips.loc[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +245,7 @@ def _cell(row: Mapping[str, Any], key: str) -> Any:
     value, low, high = row[key], row.get(f"{key}_p10"), row.get(f"{key}_p90")
     if value is None or low is None or high is None:
         return value
-    return f"{value:.4g} ({low:.4g} to {high:.4g})"
+    return f"{value:.3g} ({low:.3g} to {high:.3g})"
 
 
 def _throws(faults: CarriedFaults, unit: str) -> str:
@@ -321,13 +343,19 @@ def _block_areas(
     # 1.5 blocks if one layer of blocks is drawn, one block if two: no cell between stays empty.
     side = 1.5 * np.sqrt(frame.width * frame.height / len(unfolded))
     side = max(side, max(frame.width, frame.height) / _CELLS)
+    known = sorted(set(block.tolist()), key=by_number)
+    rank = {name: k for k, name in enumerate(known)}
+    code = np.array([rank[name] for name in block.tolist()])
     cell = np.floor(pixels / side).astype(np.int64)
+    cells, place = np.unique(cell, axis=0, return_inverse=True)
+    count = np.bincount(place.ravel() * len(known) + code, minlength=len(cells) * len(known))
+    most = count.reshape(len(cells), len(known)).argmax(axis=1)  # the fault block of each cell
     areas, names = [], []
-    for k, name in enumerate(sorted(set(block.tolist()), key=by_number)):
-        own = np.unique(cell[block == name], axis=0)
-        colour = colours[k % len(colours)]
-        areas.append(f'<path fill="{colour}" fill-opacity=".55" d="{_runs(own, side)}"/>')
-        x, y = np.median(pixels[block == name], axis=0)
+    for k, name in enumerate(known):
+        colour, own = colours[k % len(colours)], cells[most == k]
+        if len(own):
+            areas.append(f'<path fill="{colour}" fill-opacity=".55" d="{_runs(own, side)}"/>')
+        x, y = np.median(pixels[code == k], axis=0)
         names.append(f'<text class="mid" x="{x:.0f}" y="{y:.0f}">{text(name)}</text>')
     return "".join(areas), "".join(names)
 

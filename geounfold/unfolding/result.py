@@ -140,6 +140,18 @@ class Unfolding:
         return pd.DataFrame() if found is None else found.slips()
 
     @property
+    def fault_surfaces(self) -> dict[str, tuple[Floats, Ints]]:
+        """Vertices and triangles of the faults by name, in the data's coordinates, folded space.
+
+        They are those given, or those fitted between the fault blocks.
+        """
+        found = self._record.faulted
+        if found is None:
+            return {}
+        to_world = self.frame.to_world
+        return {surface.name: (to_world(surface.V), surface.F) for surface in found.cells.surfaces}
+
+    @property
     def junctions(self) -> tuple[Junction, ...]:
         """Places where sheet parts meet, in the data's coordinates; empty for whole bodies."""
         return self._record.junctions

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
+import geounfold as gu
 from geounfold.errors import InputError
-from geounfold.report import CarriedFaults
+from geounfold.report import CarriedFaults, carried_faults
 from geounfold.report.body import report_body
 from geounfold.report.columns import read_columns
 from geounfold.report.faults import (
@@ -20,6 +21,7 @@ from geounfold.report.faults import (
     joined_surfaces,
 )
 from geounfold.report.payload import CATEGORIES
+from geounfold.synthetic.faulted import simulate_faulted
 from tests.report.test_payload import decoded, lattice, packed
 
 PLACES = np.array([0.0, 1, 2, 3, 8, 9])  # along strike; 3 and 8 are no neighbours
@@ -158,3 +160,22 @@ def test_neighbours_of_a_block_lie_in_its_own_fault_block() -> None:
     assert across.results["nmd_error"].max() > 0.1
     few = {"fault_block": np.where(np.arange(len(BLOCKS)) < 3, 1, 0)}
     assert report_body(moved, BLOCKS, few).neighbours is not None
+
+
+def test_faults_of_an_unfolding_are_carried_by_their_own_blocks() -> None:
+    body = simulate_faulted("normal_1T", steps=(20.0, 20.0, 10.0))
+    u = gu.unfold(body.folded, faults=body.surfaces)
+    found = carried_faults(u)
+    assert found is not None
+    # The surface may have other vertices, on the same plane.
+    off = body.spec.faults[0].coordinates(found.surfaces["f1"][0])[:, 2]
+    assert_allclose(off, 0, atol=1e-6)
+    foot, hanging = found.places("foot", "unfolded"), found.places("hanging", "unfolded")
+    # Both walls meet in flat space: gaps are distances across the fault, no longer than the whole.
+    # Places between the surface's vertices are carried with 0.03 blocks of 15.9 of difference.
+    apart = np.linalg.norm((hanging - foot)[:, :2], axis=1)
+    assert (apart >= np.abs(found.slips["gap"]) - 0.05 * body.step).mean() > 0.99
+    assert np.median(apart) < body.step
+    moved = found.places("hanging", "folded") - found.places("foot", "folded")
+    assert np.median(np.linalg.norm(moved, axis=1)) > 2.5 * body.step  # 50 of blocks of 15.9
+    assert carried_faults(gu.unfold(gu.simulate("sim_case_1").folded)) is None

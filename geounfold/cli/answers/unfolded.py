@@ -109,7 +109,7 @@ class UnfoldedBody:
         return {**world, **found, **self._body.volumes.columns(frame, found)}
 
     def _write_report(self, path: Path) -> None:
-        from geounfold.report import write_report
+        from geounfold.report import carried_faults, write_report
 
         body, result = self._body, self._result
         table = cast(PointTable | PartedTable, body.table)  # a report's table is read whole
@@ -120,6 +120,7 @@ class UnfoldedBody:
             result.points,
             report_columns(table, _results(result, slice(0, len(table)), self._asked)),
             holes=report_holes(body.holes, self._holes, body.samples, self._samples),
+            faults=carried_faults(result),
             exploration=self._exploration,
         )
 

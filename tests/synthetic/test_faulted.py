@@ -328,3 +328,22 @@ def test_values_that_make_no_body_are_refused(make: object, message: str) -> Non
     assert callable(make)
     with pytest.raises(OptionError, match=message):
         make()
+
+
+def test_a_number_of_blocks_sets_their_size() -> None:
+    body = simulate_faulted("swell", blocks=3000)
+    # Four layers of blocks, counted by their middles.
+    assert len(body.folded) == pytest.approx(3000, rel=0.05)
+    assert len(body.surfaces["f1"][1]) > 1000
+    with pytest.raises(OptionError, match="blocks must be at least 1"):
+        simulate_faulted("swell", blocks=0)
+
+
+def test_the_table_has_truth_and_sides(bodies: dict[str, FaultedBody]) -> None:
+    table = bodies["sub_blocked"].frame(2)
+    assert list(table) == [
+        *(f"{what}_{axis}" for what in ("centroid", "true", "dim") for axis in "xyz"),
+        "true_fault_block",
+    ]
+    assert table["true_fault_block"].dtype.kind == "i"
+    assert "dim_x" not in bodies["tip"].frame()

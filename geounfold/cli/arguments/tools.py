@@ -10,7 +10,8 @@ from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, WHERE, joined
 
 _SIMULATE = """\
 columns: centroid_x, centroid_y, centroid_z folded, true_x, true_y, true_z
-before folding, in metres, to four decimals. The same case gives the same file."""
+before folding, in metres, to four decimals; of faulted bodies true_fault_block
+too. The same case gives the same file."""
 
 _DOCTOR = """\
 The exit status is 1 if a library that geounfold needs is missing, has another
@@ -27,15 +28,28 @@ def add_simulate(commands: Any) -> Parser:
     parser = add_command(
         commands,
         "simulate",
-        "make a simulated folded body, with its exact truth",
+        "make a simulated folded or faulted body, with its exact truth",
         details=_SIMULATE,
-        examples=("geounfold simulate --list", "geounfold simulate plunging -o blocks.csv"),
+        examples=(
+            "geounfold simulate --list",
+            "geounfold simulate plunging -o blocks.csv",
+            "geounfold simulate graben -o graben.csv --faults-out graben.ts",
+        ),
     )
     group = parser.section("body")
     group.add("case", metavar="CASE", nargs="?", help="the body's name")
     group.add("--list", action="store_true", help="list the bodies, one line each")
     group.add("-o", "--output", metavar="OUT", help=f"the blocks: {POINTS}")
-    group.add("--blocks", metavar="N", help="scale the body in its plane to about N blocks")
+    group.add(
+        "--faults-out",
+        metavar="F",
+        help="the surfaces of a faulted body, a file each: graben_f1.ts, ... of graben.ts",
+    )
+    group.add(
+        "--blocks",
+        metavar="N",
+        help="scale the body in its plane to about N blocks; of a faulted body, scale the blocks",
+    )
     return parser
 
 

@@ -14,7 +14,7 @@ _FILES = frozenset(
     {
         *("points", "output", "summary", "map", "mesh", "report", "samples", "samples_out", "top"),
         *("bottom", "holes", "traces_out", "folded", "unfolded", "truth", "config"),
-        *("source", "target", "variogram", "differences"),
+        *("source", "target", "variogram", "differences", "faults_out"),
     }
 )
 
@@ -60,9 +60,10 @@ def script(shell: str) -> str:
 def _named_values() -> dict[str, tuple[str, ...]]:
     """Return the valid words of the options that have words as values."""
     from geounfold.synthetic import CASES
+    from geounfold.synthetic.faulted import FAULTED_CASES
     from geounfold.unfolding.options import VALID
 
-    return {**VALID, "case": tuple(CASES)}
+    return {**VALID, "case": (*CASES, *FAULTED_CASES)}
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[Any]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
+
+import pandas as pd
 
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.synthetic.faulted.recipe import FaultedSpec
@@ -89,6 +92,25 @@ class FaultedBody:
     def step(self) -> float:
         """Side of a cube of a block's volume: the unit of errors in blocks."""
         return self.spec.step
+
+    def frame(self, decimals: int | None = None) -> pd.DataFrame:
+        """Return a table with a row per block.
+
+        Columns are centroid_x/y/z, true_x/y/z, true_fault_block and, if blocks differ in size,
+        dim_x/y/z: their sides along the lattice's axes.
+
+        Parameters
+        ----------
+        decimals : int, optional
+            Decimals to which all columns are rounded; not rounded by default.
+        """
+        data: dict[str, Any] = {f"centroid_{c}": self.folded[:, i] for i, c in enumerate("xyz")}
+        data |= {f"true_{c}": self.truth[:, i] for i, c in enumerate("xyz")}
+        if (self.sizes != self.sizes[:1]).any():
+            data |= {f"dim_{c}": self.sizes[:, i] for i, c in enumerate("xyz")}
+        table = pd.DataFrame(data)
+        table = table if decimals is None else table.round(decimals) + 0.0
+        return table.assign(true_fault_block=self.fault_block)
 
     def with_surfaces(self, surfaces: Mapping[str, Surface]) -> FaultedBody:
         """Return the body with other surfaces; its truth stays."""

@@ -293,13 +293,17 @@ FAULTED_CASES: Mapping[str, FaultedSpec] = MappingProxyType(_CASES)
 """Recipes of the named faulted bodies, by name; read-only."""
 
 
-def simulate_faulted(case: str | FaultedSpec, **overrides: object) -> FaultedBody:
+def simulate_faulted(
+    case: str | FaultedSpec, *, blocks: int | None = None, **overrides: object
+) -> FaultedBody:
     """Return a body that was folded and faulted, with its exact truth.
 
     Parameters
     ----------
     case : str or FaultedSpec
         A name in FAULTED_CASES, or a recipe.
+    blocks : int, optional
+        Number of blocks; all are enlarged or reduced so that the body has about as many.
     **overrides
         Other values of FaultedSpec fields, such as ``steps=(10, 10, 5)``, ``bearing=30``,
         ``sub_blocks=2`` or ``grid="scattered"``.
@@ -328,7 +332,8 @@ def simulate_faulted(case: str | FaultedSpec, **overrides: object) -> FaultedBod
         raise OptionError(f"no faulted body is named {case!r}; valid: {known}")
     name = case if isinstance(case, str) else "custom"
     spec = FAULTED_CASES[case] if isinstance(case, str) else case
-    return sample(name, spec.with_options(**overrides))
+    spec = spec.with_options(**overrides)
+    return sample(name, spec if blocks is None else spec.with_blocks(blocks))
 
 
 def random_faulted(seed: int, **overrides: object) -> FaultedBody:

@@ -198,6 +198,25 @@ class FaultedSpec:
                 raise OptionError(f"no option {name!r}; valid: {', '.join(names)}")
         return replace(self, **overrides)  # type: ignore[arg-type]
 
+    def with_blocks(self, count: int) -> FaultedSpec:
+        """Return the recipe with larger or smaller blocks, about ``count`` of them.
+
+        Raises
+        ------
+        OptionError
+            The count is below 1.
+        """
+        if count < 1:
+            raise OptionError(f"blocks must be at least 1, not {count!r}")
+        share = np.linspace(-0.1, 1.1, 240)  # a wandering outline leaves the rectangle
+        u, v = np.meshgrid(share * self.length, share * self.width)
+        inside = self.in_outline(u, v)
+        area = 1.2**2 * self.length * self.width * float(inside.mean())
+        volume = 2 * float(self.half_thickness(u, v)[inside].mean()) * area
+        factor = float(np.cbrt(volume / count / np.prod(self.steps)))
+        x, y, z = (step * factor for step in self.steps)
+        return replace(self, steps=(x, y, z))
+
     def half_thickness(self, u: Floats, v: Floats) -> Floats:
         """Return half the thickness at flat places (u, v)."""
         wave = np.sin(2 * np.pi * u / (0.9 * self.length) + 1)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from geounfold.cli import main
+from geounfold.io.surfaces import read_surface
 
 
 def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -31,3 +32,34 @@ def test_simulate_writes_four_decimals_and_about_so_many_blocks(tmp_path: Path) 
     assert 1600 < len(rows) < 2400  # whole blocks, six layers: measured 1,944
     assert max(len(value.partition(".")[2]) for row in rows for value in row.split(",")) == 4
     assert main(["simulate", "sim_case_1", "--blocks", "0", "-o", str(tmp_path / "x.csv")]) == 2
+
+
+def test_a_faulted_body_is_written_with_its_surfaces(tmp_path, capsys):
+    out = tmp_path / "graben.csv"
+    arguments = ["simulate", "graben", "-o", str(out), "--blocks", "2000"]
+    assert main([*arguments, "--faults-out", str(tmp_path / "graben.ts")]) == 0
+    table = pd.read_csv(out)
+    assert sorted(set(table.true_fault_block)) == [0, 1, 2]
+    for name in ("f1", "f2"):
+        mesh = read_surface(tmp_path / f"graben_{name}.ts")
+        assert len(mesh.F) > 500
+    assert main([*arguments, "--overwrite"]) == 0
+    capsys.readouterr()
+    assert main(["simulate", "--list"]) == 0
+    assert "faulted: two faults that dip towards each other" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["plunging", "-o", "a.csv", "--faults-out", "a.ts"], "plunging has no faults; faulted: n"),
+        (["--list", "--faults-out", "a.ts"], "--list has neither CASE nor -o nor --faults-out"),
+        (["graben", "-o", "a.csv", "--faults-out", "a.xyz9"], "a_f1.xyz9"),
+        (["graben", "-o", "a.csv", "--blocks", "0"], "--blocks"),
+    ],
+)
+def test_what_no_faulted_body_can_be_made_of(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", *arguments]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -19,7 +19,7 @@ from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
 from geounfold.body.sub_blocks import filled_cells
 from geounfold.body.working_frame import Frame, working_frame
-from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats, Ints, TriMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +81,15 @@ class BodyPoints:
         What was mended of this body; None without a lattice.
     walls : FaultWalls or None
         The faults and limits at which the body was cut off; None if no cut is known.
+    shell : TriMesh or None
+        The surface of the solid that the blocks fill; None if there is none, or it is no hull.
     """
 
     fitted: Floats
     blocks: Floats
     mended: MendingRecord | None = None
     walls: FaultWalls | None = None
+    shell: TriMesh | None = None
 
 
 @dataclass(frozen=True, eq=False)

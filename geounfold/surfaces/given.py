@@ -1,14 +1,19 @@
-"""Reference surfaces given by the user, in place of an extracted hull."""
+"""Surfaces given by the user, in place of an extracted hull: two references, or a solid's own."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from geounfold.backends.igl import SurfaceIndex, triangle_adjacency
 from geounfold.backends.meshlab import remesh
-from geounfold.errors import InputError
+from geounfold.body.fill.between import facing_away
+from geounfold.errors import HullError, InputError
 from geounfold.geometry.measures import face_normals
-from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.geometry.mesh import Floats, Ints, TriMesh
+from geounfold.surfaces.hull import Hull, unsuitability
+from geounfold.surfaces.hull._finish import finish
 from geounfold.surfaces.split.result import SurfaceSplit
 
 EDGE = 1.5
@@ -29,7 +34,7 @@ def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
         The surfaces do not face each other anywhere.
     """
     upper, lower = (_resampled(mesh) for mesh in (top, bottom))
-    upper, lower = _facing_away(upper, lower), _facing_away(lower, upper)
+    upper, lower = facing_away(upper, lower), facing_away(lower, upper)
     V = np.concatenate([upper.V, lower.V])
     F = np.concatenate([upper.F, lower.F + len(upper.V)])
     side = np.repeat([1, -1], [len(upper.F), len(lower.F)])
@@ -47,17 +52,43 @@ def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
     return SurfaceSplit(TriMesh(V, F), side, rim, hit, distance, median, adjacency, False, beyond)
 
 
+def solid_hull(mesh: TriMesh, cells: Floats, volume: float) -> Hull:
+    """Return a solid's own surface as the hull of its blocks.
+
+    It has no stairs and is not blurred, so top and bottom are the solid's, not those of blocks.
+
+    Parameters
+    ----------
+    mesh : TriMesh
+        The closed surface, in the unit of the cells.
+    cells : (n, 3) float
+        Centres of the blocks, or of merged ones, whose side is one unit.
+    volume : float
+        Their volume.
+
+    Raises
+    ------
+    HullError
+        It has a handle, or does not hold the blocks.
+    """
+    hull = finish(mesh.V, mesh.F, method="solid", blocks=volume, edge=EDGE)
+    handles = 1 - _euler(hull.mesh.F) // 2
+    if handles:
+        raise HullError(f"the solid's surface has {handles} handle{'s' if handles > 1 else ''}")
+    fault = unsuitability(hull, cells)
+    if fault:
+        raise HullError(f"the solid's surface does not fit its blocks: {fault}")
+    return replace(hull, reason="the surface of the solid that was given")
+
+
+def _euler(F: Ints) -> int:
+    """Return vertices less edges plus triangles of a closed surface."""
+    return len(np.unique(F)) - len(F) // 2
+
+
 def _resampled(mesh: TriMesh) -> TriMesh:
     V, F = remesh(mesh.V, mesh.F, EDGE, 3)
     return TriMesh(V, F)
-
-
-def _facing_away(mesh: TriMesh, other: TriMesh) -> TriMesh:
-    """Return a surface with its normals turned away from the other."""
-    centres = mesh.V[mesh.F].mean(axis=1)
-    nearest = SurfaceIndex(other.V, other.F).closest(centres)[2]
-    outward = np.einsum("ij,ij->i", centres - nearest, face_normals(mesh.V, mesh.F))
-    return mesh if outward.sum() >= 0 else TriMesh(mesh.V, mesh.F[:, ::-1])
 
 
 def _opposite(V: Floats, F: np.ndarray, tops: int) -> tuple[np.ndarray, Floats]:

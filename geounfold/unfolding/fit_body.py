@@ -22,7 +22,7 @@ from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.methods import METHODS, BodyFit, PreparedBody, SurfacePair
 from geounfold.methods.contract import Stage, mean_top_normal
 from geounfold.methods.turned_over import OTHER_SIDE, turned_over
-from geounfold.surfaces.given import split_reference
+from geounfold.surfaces.given import solid_hull, split_reference
 from geounfold.surfaces.hull import extract_hull
 from geounfold.surfaces.split import split
 from geounfold.surfaces.split.result import SurfaceSplit
@@ -60,6 +60,24 @@ def fit(
     HullError, SplitError, FlatteningError
         As the stages do.
     """
+    if body.shell is not None and reference is None and options.hull == "auto":
+        try:
+            return _fit_in_turn(body, frame, options, reference, stage)
+        except _TOO_COARSE as error:
+            found = fit(replace(body, shell=None), frame, options, reference, stage)
+            told = f"the horizons are those of the blocks, not of the solid's surface: {error}"
+            return replace(found, warnings=(*found.warnings, told))
+    return _fit_in_turn(replace(body, shell=None), frame, options, reference, stage)
+
+
+def _fit_in_turn(
+    body: BodyPoints,
+    frame: Frame,
+    options: UnfoldOptions,
+    reference: tuple[TriMesh, TriMesh] | None,
+    stage: Stage,
+) -> BodyFit:
+    """Return the fit of one body, to merged blocks first if there are many (see fit)."""
     if body.mended is not None and reference is None:
         body.mended.check()
     with stage("hull"):
@@ -111,7 +129,11 @@ def _fit_at(
             name = method.hull if options.hull == "auto" else options.hull
             coarse = merge_blocks(points, frame.steps, merge) if merge > 1 else None
             cells, share = (points, None) if coarse is None else (coarse.points, coarse.share)
-            hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
+            if body.shell is None:
+                hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
+            else:
+                shell = body.shell.with_vertices(body.shell.V / merge)
+                hull = solid_hull(shell, cells, float(len(cells) if share is None else share.sum()))
         with stage("split"):
             parts = split(hull.mesh, options.split)
             if body.walls is not None:

@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 
 from geounfold.backends.blas import one_thread
+from geounfold.body.fill import FilledSolid
+from geounfold.body.fill.shell_of_bodies import with_shells
 from geounfold.body.parts.division import Division
 from geounfold.body.prepare import PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
@@ -61,7 +63,7 @@ class _Clock:
 
 @one_thread()
 def unfold(  # the inputs on faults belong together, and to the points as top and bottom do
-    points: Floats | pd.DataFrame,
+    points: Floats | pd.DataFrame | FilledSolid,
     options: UnfoldOptions | None = None,
     *,
     top: TriMesh | tuple[Any, Any] | None = None,
@@ -78,9 +80,10 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
 
     Parameters
     ----------
-    points : (n, 3) array or DataFrame
+    points : (n, 3) array, DataFrame or FilledSolid
         Centroids in any length unit and any coordinates; of a DataFrame the coordinate
-        columns are found by name (centroid_x/y/z, x/y/z, XC/YC/ZC, easting/...).
+        columns are found by name (centroid_x/y/z, x/y/z, XC/YC/ZC, easting/...).  Of a
+        solid that `fill` made, its own surfaces become the horizons.
     options : UnfoldOptions, optional
         Defaults if not given.
     top, bottom : TriMesh or (V, F), optional
@@ -127,6 +130,11 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     """
     chosen = replace(options or UnfoldOptions(), **changes)
     check_method(chosen)
+    solid = points if isinstance(points, FilledSolid) else None
+    if solid is not None:
+        points = solid.table
+        if solid.pair is not None and top is None and bottom is None:
+            top, bottom = solid.pair.top, solid.pair.bottom
     given, rows = points if isinstance(points, pd.DataFrame) else None, None
     if where is not None:
         if given is None:
@@ -146,6 +154,8 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         prepared, bodies = prepare(place, chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
     reference = _reference(top, bottom, prepared.frame)
+    if solid is not None and reference is None:
+        bodies = with_shells(bodies, prepared, solid.shell)
     fits = []
     for part, body in enumerate(bodies):
         with _named(prepared.division, part):

@@ -16,6 +16,7 @@ from geounfold._version import __version__
 
 if TYPE_CHECKING:
     from geounfold.body.block_model import BlockModel, regular_grid
+    from geounfold.body.fill import FilledSolid
     from geounfold.body.model_frame import ModelFrame, axes_from_angles
     from geounfold.comparison.crosscheck import CrossCheck, crosscheck
     from geounfold.comparison.flatteners import compare
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from geounfold.flattening import FLATTENERS, Flattening, flatten
     from geounfold.geometry.mesh import TetMesh, TriMesh
     from geounfold.io.block_sizes import block_model
+    from geounfold.io.solids import fill
     from geounfold.mapping.control_mesh import ControlMesh
     from geounfold.mapping.mesh_map import UnfoldingMap, load
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
@@ -59,6 +61,8 @@ _HOMES = {
     "crosscheck": "comparison.crosscheck",
     "DrillHoles": "drillholes",
     "read_drillholes": "drillholes",
+    "FilledSolid": "body.fill",
+    "fill": "io.solids",
     "GeounfoldError": "errors",
     "InputError": "errors",
     "Estimation": "estimation",
@@ -95,6 +99,7 @@ __all__ = [
     "CrossCheck",
     "DrillHoles",
     "Estimation",
+    "FilledSolid",
     "Flattening",
     "GeounfoldError",
     "InputError",
@@ -117,6 +122,7 @@ __all__ = [
     "epsilon",
     "estimate",
     "explore",
+    "fill",
     "fit_variogram",
     "flatten",
     "load",

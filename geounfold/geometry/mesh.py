@@ -103,6 +103,21 @@ class TriMesh:
         V[:, : self.V.shape[1]] = self.V
         return pyvista.PolyData.from_regular_faces(V, self.F.copy())
 
+    def quartered(self) -> TriMesh:
+        """Return the surface with every triangle cut in four at the middles of its edges.
+
+        >>> len(TriMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).quartered().F)
+        4
+        """
+        V, F = self.V, self.F
+        ends = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
+        edges, back = np.unique(ends, axis=0, return_inverse=True)
+        ab, bc, ca = back.reshape(3, -1) + len(V)
+        a, b, c = F.T
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        quarters = np.concatenate([np.stack(part, axis=1) for part in parts])
+        return TriMesh(np.concatenate([V, V[edges].mean(axis=1)]), quarters)
+
     def submesh(self, faces: Bools | Ints) -> tuple[TriMesh, Ints]:
         """Return the mesh of some faces without unused vertices, and its vertices' old indices."""
         old, F = np.unique(self.F[faces], return_inverse=True)

@@ -20,6 +20,10 @@ EDGE = 1.5
 """Edge length to which reference surfaces are resampled, working units."""
 
 
+SOLID = "solid"
+"""Name of the hull that is a solid's own surface."""
+
+
 def split_reference(top: TriMesh, bottom: TriMesh) -> SurfaceSplit:
     """Return two reference surfaces as a split hull without rim.
 
@@ -71,7 +75,7 @@ def solid_hull(mesh: TriMesh, cells: Floats, volume: float) -> Hull:
     HullError
         It has a handle, or does not hold the blocks.
     """
-    hull = finish(mesh.V, mesh.F, method="solid", blocks=volume, edge=EDGE)
+    hull = finish(mesh.V, mesh.F, method=SOLID, blocks=volume, edge=EDGE)
     handles = 1 - _euler(hull.mesh.F) // 2
     if handles:
         raise HullError(f"the solid's surface has {handles} handle{'s' if handles > 1 else ''}")

@@ -130,9 +130,9 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     """
     chosen = replace(options or UnfoldOptions(), **changes)
     check_method(chosen)
-    solid = points if isinstance(points, FilledSolid) else None
-    if solid is not None:
-        points = solid.table
+    solid: FilledSolid | None = None
+    if isinstance(points, FilledSolid):
+        solid, points = points, points.table
         if solid.pair is not None and top is None and bottom is None:
             top, bottom = solid.pair.top, solid.pair.bottom
     given, rows = points if isinstance(points, pd.DataFrame) else None, None

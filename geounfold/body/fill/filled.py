@@ -11,11 +11,11 @@ import pandas as pd
 
 from geounfold.backends.igl import SurfaceIndex
 from geounfold.backends.igl_solids import FastWinding
-from geounfold.body.fill.between import Pair, facing_pair
+from geounfold.body.fill.between import Pair, facing_pair, walled
 from geounfold.body.fill.cells import Cells, Distance, Inside, cells_inside
 from geounfold.body.fill.shell import Shell, closed_shell
 from geounfold.errors import InputError, OptionError, check_number
-from geounfold.geometry.mesh import Bools, Floats, TriMesh
+from geounfold.geometry.mesh import Floats, TriMesh
 
 ACROSS = 8
 """Blocks across the mean thickness, if no size is given.
@@ -137,20 +137,12 @@ def fill_solid(
     """
     _check(block_size, sub_blocks)
     shell = closed_shell(mesh)
-    wind = FastWinding(shell.mesh.V, shell.mesh.F)
-    index = SurfaceIndex(shell.mesh.V, shell.mesh.F)
     cells, told = _own_cells(shell, block_size)
     if cells is None:
         step, told = _size(block_size, shell.thickness, shell.volume)
         cells = Cells(step)
 
-    def inside(points: Floats) -> Bools:
-        return np.asarray(wind(points) > 0.5)
-
-    def far(points: Floats) -> Floats:
-        return index.closest(points)[0]
-
-    points, sizes = _blocks(cells, shell.mesh.V, (inside, far), sub_blocks)
+    points, sizes = _blocks(cells, shell.mesh.V, _inside(shell.mesh), sub_blocks)
     _check_some(points, cells, shell.thickness)
     return FilledSolid(points, sizes, cells.step, shell, None, (*shell.told, *told))
 
@@ -163,8 +155,8 @@ def fill_between(
 ) -> FilledSolid:
     """Return the blocks whose centres lie between two open surfaces.
 
-    A centre lies between them if they fill more than half of its view. At the border of surfaces
-    above each other that is the wall that joins their borders.
+    A wall joins their borders. If one has a hole or several parts, a centre lies between them if
+    they fill more than half of its view, which cuts rims short by up to a thickness.
 
     Parameters
     ----------
@@ -182,21 +174,33 @@ def fill_between(
     """
     _check(block_size, sub_blocks)
     pair = facing_pair(top, bottom)
+    closed = walled(pair)
     V = np.concatenate([pair.top.V, pair.bottom.V])
     F = np.concatenate([pair.top.F, pair.bottom.F + len(pair.top.V)])
-    wind = FastWinding(V, F)
     step, told = _size(block_size, pair.thickness, pair.volume)
     cells = Cells(step)
-
-    def inside(points: Floats) -> Bools:
-        return np.asarray(wind(points) > 0.5)
-
-    def far(points: Floats) -> Floats:  # a large cell far from both may still be cut by the wall
-        return np.zeros(len(points))
-
-    points, sizes = _blocks(cells, V, (inside, far), sub_blocks)
+    solid = _within(TriMesh(V, F)) if closed is None else _inside(closed)
+    points, sizes = _blocks(cells, V, solid, sub_blocks)
     _check_some(points, cells, pair.thickness)
     return FilledSolid(points, sizes, step, None, pair, told)
+
+
+def _inside(mesh: TriMesh) -> tuple[Inside, Distance]:
+    """Return what tells points inside a closed surface, and their distance from it."""
+    wind, index = FastWinding(mesh.V, mesh.F), SurfaceIndex(mesh.V, mesh.F)
+    return (
+        lambda points: np.asarray(wind(points) > 0.5),
+        lambda points: index.closest(points)[0],
+    )
+
+
+def _within(mesh: TriMesh) -> tuple[Inside, Distance]:
+    """Return what tells points between open surfaces: these fill more than half of the view.
+
+    Nothing is known about a whole large cell then.
+    """
+    wind = FastWinding(mesh.V, mesh.F)
+    return lambda points: np.asarray(wind(points) > 0.5), lambda points: np.zeros(len(points))
 
 
 def _check(block_size: float | Sequence[float] | None, sub_blocks: int) -> None:

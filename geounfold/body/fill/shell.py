@@ -13,6 +13,7 @@ import numpy as np
 
 from geounfold.backends.igl import face_components, self_intersections
 from geounfold.backends.igl_solids import FastWinding, coherent, union_of_parts
+from geounfold.body.check import MIN_POINTS
 from geounfold.body.fill.edges import (
     Holes,
     border_edges,
@@ -140,6 +141,8 @@ def _blocks(mesh: TriMesh) -> Lattice | None:
     lattice = measure_lattice(mesh.V)
     if lattice is None:
         return None
+    if enclosed_volume(mesh.V, mesh.F) < MIN_POINTS * lattice.steps.prod():
+        return None
     along = np.abs(face_normals(mesh.V, mesh.F) @ lattice.axes.T).max(axis=1) > _ALONG
     area = triangle_areas(mesh.V, mesh.F)
     return lattice if area[along].sum() > STAIRS * area.sum() else None
@@ -235,12 +238,15 @@ def _with_content(V: Floats, F: Ints, told: list[str]) -> Ints:
             f"{_count(int(loose.sum()), 'loose triangle')} that enclose nothing were left out, the "
             f"first at {at(V[F[loose][0]].mean(axis=0))}"
         )
-    return F[~loose]
+    return np.asarray(F[~loose], dtype=np.int64)
 
 
 def _volumes(V: Floats, F: Ints, part: Ints, count: int) -> Floats:
-    """Return the signed volume of each part, (count,)."""
-    a, b, c = (V[F[:, k]] - V.mean(axis=0) for k in range(3))
+    """Return the signed volume of each part, (count,), of an open one about its own middle."""
+    corners = V[F]
+    sums = [np.bincount(part, corners.mean(axis=1)[:, k], count) for k in range(3)]
+    middle = np.stack(sums, axis=1) / np.bincount(part, minlength=count)[:, None]
+    a, b, c = (corners[:, k] - middle[part] for k in range(3))
     out = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, count)
     return np.asarray(out, dtype=np.float64)
 

@@ -66,6 +66,8 @@ class UnfoldedBody:
         self.warnings: list[str] = [*summary.get("warnings", []), *self._carried_warnings()]
         read = body.table.facts() | ({} if body.frame is None else body.frame.facts())
         self.summary = {**summary, "warnings": self.warnings, "input": read}
+        if body.solid is not None:
+            self.summary["solid"] = body.solid.facts()
         if body.samples is not None:
             self.summary["samples"] = body.samples.facts()
         if body.holes is not None:

@@ -1,10 +1,11 @@
-"""Arguments of the commands that make and fill block models: grid and transfer."""
+"""Arguments of the commands that make and fill block models: fill, grid and transfer."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from geounfold.cli.arguments.groups import (
+    add_block_size,
     add_command,
     add_element,
     add_frame,
@@ -12,7 +13,15 @@ from geounfold.cli.arguments.groups import (
     add_where,
 )
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.texts import ANGLES, POINT_FORMATS, POINTS, TABLES, WHERE, joined
+from geounfold.cli.arguments.texts import (
+    ANGLES,
+    FORMATS,
+    POINT_FORMATS,
+    POINTS,
+    TABLES,
+    WHERE,
+    joined,
+)
 
 _GRID = """\
 The blocks lie along the axes of the unfolded space; their faces are at whole
@@ -27,6 +36,44 @@ of volume times value of both files.
 
 Sides are columns (XINC, dx, size_x and alike are found) or lengths; without,
 they are the steps of the centroids' lattice."""
+
+
+_FILL = """\
+Columns: x, y, z of the centroids, dx, dy, dz. A block belongs to the solid if
+the winding number of its centre is above one half; corners of blocks lie at
+whole multiples of their sides. Corners that should be one, small holes, loose
+triangles and parts that cross are mended, and told. A surface that is not
+closed is refused: give the surfaces above and below by --top and --bottom."""
+
+
+def add_fill(commands: Any) -> Parser:
+    """Add the command fill and its arguments."""
+    parser = add_command(
+        commands,
+        "fill",
+        "fill a wireframe with blocks",
+        details=joined(_FILL, FORMATS),
+        examples=(
+            "geounfold fill solid.dxf -o blocks.parquet",
+            "geounfold fill solid.stl -o blocks.csv --block-size 10,10,5 --sub-blocks 4",
+            "geounfold fill --top roof.ts --bottom floor.ts -o blocks.csv --block-size 2",
+        ),
+    )
+    group = parser.section("solid")
+    group.add(
+        "points",
+        nargs="?",
+        metavar="SOLID",
+        help="a closed surface: .dxf .obj .stl .ply .off .ts .vtp .omf .geoh5",
+    )
+    group.add("--top", metavar="T", help="without SOLID: the surface above the body")
+    group.add("--bottom", metavar="B", help="the surface below it")
+    group.add("--element", metavar="NAME", help="the surface to read, in a file of several")
+    add_block_size(group)
+    group = parser.section("outputs")
+    group.add("-o", "--output", metavar="OUT", required=True, help=f"the blocks: {POINTS}")
+    group.add("--summary", metavar="S.json", help="figures, and what was mended")
+    return parser
 
 
 def add_grid(commands: Any) -> Parser:

@@ -31,8 +31,7 @@ def add_columns(section: Section) -> None:
     section.add(
         "--columns",
         metavar="A,B,C",
-        help="columns of the coordinates, if not x/y/z, XC/YC/ZC, centroid_x/y/z, "
-        "easting/northing/elevation or alike",
+        help="columns of the coordinates, if their names are unusual",
     )
     add_where(section, "where", "rows to take, such as ROCK=ORE; others stay empty", rare=False)
     add_element(section, "element", "POINTS")
@@ -84,6 +83,24 @@ def add_frame(section: Section, whose: str, rotation: str = "") -> None:
         metavar="BEARING,PLUNGE,DIP",
         rare=True,
         help=rotation or "with --origin: how the model is turned, in degrees (default 0,0,0)",
+    )
+
+
+SIZE_BY_DEFAULT = " for a cube (default: an eighth of its thickness, or what its faces show)"
+
+
+def add_block_size(section: Section, *, rare: bool = False) -> None:
+    """Add the options of blocks that fill a closed surface."""
+    section.add(
+        "--block-size",
+        metavar="X,Y,Z",
+        help="sides of blocks in a closed surface, or one" + ("" if rare else SIZE_BY_DEFAULT),
+    )
+    section.add(
+        "--sub-blocks",
+        metavar="N",
+        rare=rare,
+        help="split the sides of blocks that the surface cuts into 2, 4 or 8",
     )
 
 

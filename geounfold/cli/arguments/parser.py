@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from geounfold import _version
-from geounfold.cli.arguments.blocks import add_grid, add_transfer
+from geounfold.cli.arguments.blocks import add_fill, add_grid, add_transfer
 from geounfold.cli.arguments.compare import add_compare, add_crosscheck, add_quality
 from geounfold.cli.arguments.estimate import add_estimate
 from geounfold.cli.arguments.groups import add_common
@@ -75,7 +75,7 @@ def build_parser(*, holes: bool = False) -> Parser:
     for add in (
         *(add_unfold, partial(add_map, holes=holes), add_estimate),
         *(add_compare, add_crosscheck, add_quality, add_simulate, add_view),
-        *(add_grid, add_transfer, add_init, add_doctor, add_completion),
+        *(add_fill, add_grid, add_transfer, add_init, add_doctor, add_completion),
     ):
         add_common(add(commands))
     options = parser.section("options")

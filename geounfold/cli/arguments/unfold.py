@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from geounfold.cli.arguments.groups import (
+    add_block_size,
     add_columns,
     add_command,
     add_frame,
@@ -53,13 +54,19 @@ def add_unfold(commands: Any) -> Parser:
         examples=_EXAMPLES,
     )
     group = parser.section("body")
-    group.add("points", metavar="POINTS", help=f"block centroids: {POINTS}")
+    group.add(
+        "points",
+        nargs="?",
+        metavar="POINTS",
+        help="block centroids, or a closed surface to fill",
+    )
     add_columns(group)
     group.add(
         "--sizes",
         metavar="X,Y,Z",
         help="sides of a block, for volumes: columns or lengths",
     )
+    add_block_size(group, rare=True)
     group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
     group.add("--bottom", metavar="B", help="the bottom surface")
     add_frame(group, "POINTS")

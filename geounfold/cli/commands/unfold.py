@@ -35,7 +35,7 @@ def run(args: Namespace, console: Console) -> None:
     from geounfold.unfolding import run as unfolding
 
     result = unfolding.unfold(
-        body.table.points, options, progress=console.stage, top=body.top, bottom=body.bottom
+        body.points, options, progress=console.stage, top=body.top, bottom=body.bottom
     )
     summary = {**result.summary(), "command": command_line(args)}
     if args.crosscheck:

@@ -11,6 +11,7 @@ from geounfold.cli.inputs.drillholes import HoleData, read_holes
 from geounfold.cli.inputs.grades import graded_samples
 from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import open_table, read_samples
+from geounfold.cli.inputs.solid import open_solid, source, table_of
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_surface
 from geounfold.io.tables.parted import PartedTable
@@ -18,8 +19,9 @@ from geounfold.io.tables.parted import PartedTable
 if TYPE_CHECKING:
     import pandas as pd
 
+    from geounfold.body.fill import FilledSolid
     from geounfold.body.model_frame import ModelFrame
-    from geounfold.geometry.mesh import TriMesh
+    from geounfold.geometry.mesh import Floats, TriMesh
     from geounfold.io.tables.large import PointStream
 
 
@@ -43,6 +45,8 @@ class BodyInputs:
         Coordinates and grade of the samples that the report explores.
     top, bottom : TriMesh or None
         Given surfaces.
+    solid : FilledSolid or None
+        The wireframe that the blocks fill.
     """
 
     table: PointTable | PointStream | PartedTable
@@ -53,6 +57,12 @@ class BodyInputs:
     graded: pd.DataFrame | None
     top: TriMesh | None
     bottom: TriMesh | None
+    solid: FilledSolid | None = None
+
+    @property
+    def points(self) -> Floats | FilledSolid:
+        """What is unfolded: the solid, or the coordinates of the blocks."""
+        return self.table.points if self.solid is None else self.solid
 
 
 def read_body(args: Namespace, console: Console) -> BodyInputs:
@@ -66,9 +76,13 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
         An option that does not fit its file.
     """
     frame = model_frame(args)
-    table = open_table(args, console, frame=frame, whole=args.report is not None)
+    solid = open_solid(args, console)
+    if solid is None:
+        table = open_table(args, console, frame=frame, whole=args.report is not None)
+    else:
+        table = table_of(solid, source(args))
     table.check_writable(args.output)
-    volumes = BlockVolumes(args.sizes, table.names, args.points)
+    volumes = BlockVolumes(args.sizes, table.names, table.source)
     samples = read_samples(args, console)
     holes = read_holes(args, console)
     return BodyInputs(
@@ -80,4 +94,5 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
         graded_samples(args, samples, holes, console),
         None if args.top is None else read_surface(args.top),
         None if args.bottom is None else read_surface(args.bottom),
+        solid,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geounfold.errors import ControlMeshError, SplitError
+from geounfold.errors import ControlMeshError, HullError, SplitError
 from geounfold.flattening import SpringOptions
 from geounfold.flattening import flatten as flatten_surface
 from geounfold.geometry.measures import face_normals, vertex_sum
@@ -24,6 +24,8 @@ from geounfold.methods.sheet.mid_surface.parallel_surface import conform
 from geounfold.methods.sheet.result import SheetResult
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites, surface_sites
 from geounfold.methods.sheet.sharpening.site_rules import SiteRules
+from geounfold.surfaces.given import SOLID
+from geounfold.surfaces.hull import extract_hull
 
 _LOOSE_SPRINGS = SpringOptions(tol=1e-4)
 
@@ -66,7 +68,7 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
             horizons = _horizons(fitted, case.samples, trial, misfit)
             return fitted, horizons, build_control(fitted, horizons, body.points, body.blocks, plan)
 
-        hull = body.split.scaled(unit).mesh
+        hull = _judged_by(body, unit)
         walls = None
         if body.walls is not None:
             walls = body.walls.at_faces(hull.V[hull.F].mean(axis=1), face_normals(hull.V, hull.F))
@@ -76,6 +78,22 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
         if unit > 1 and not best.mesh.sound:
             raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
         return SheetResult(medial, trials, best, finishes)
+
+
+def _judged_by(body: PreparedBody, unit: int) -> TriMesh:
+    """Return the closed surface by which finished meshes are judged, working units.
+
+    Between two given surfaces that is a hull of the blocks, because these have no rim. A solid's
+    own surface has edges longer than a column of the judge, which misses faces: 4 % of the outline
+    of a body of 54,400 blocks, 0.1 % with its triangles cut in four.
+    """
+    surface = body.split.scaled(unit).mesh
+    if body.hull is None:
+        try:
+            return extract_hull(body.points, body.frame.sides).mesh
+        except HullError:
+            return surface
+    return surface.quartered() if body.hull.method == SOLID else surface
 
 
 def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:

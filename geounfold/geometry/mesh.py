@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geounfold.errors import MeshError, OptionError
+from geounfold.extras import require
 
 if TYPE_CHECKING:
     import pyvista
@@ -97,7 +98,7 @@ class TriMesh:
 
     def to_pyvista(self) -> pyvista.PolyData:
         """Return the surface for pyvista; flat vertices (n, 2) at height 0."""
-        import pyvista
+        pyvista = require("pyvista", "pyvista's meshes")
 
         V = np.zeros((len(self.V), 3))
         V[:, : self.V.shape[1]] = self.V
@@ -155,7 +156,7 @@ class TetMesh:
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """Return the tetrahedra for pyvista."""
-        import pyvista
+        pyvista = require("pyvista", "pyvista's meshes")
 
         cells = np.column_stack([np.full(len(self.T), 4), self.T]).ravel()
         kinds = np.full(len(self.T), pyvista.CellType.TETRA)

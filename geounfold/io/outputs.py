@@ -19,6 +19,7 @@ from typing import Protocol
 
 from geounfold.backends.system import files
 from geounfold.errors import OutputError
+from geounfold.io.formats.registry import check_library_of
 from geounfold.io.messages import shown
 from geounfold.io.paths import ending
 
@@ -89,6 +90,8 @@ class Outputs:
             A folder is missing or cannot be written; a file exists already and may not be
             replaced; or a target is a directory, an input or another output, or has an unknown
             ending.
+        MissingDependencyError
+            A target's format needs a library that is not installed.
         """
         targets = {
             name: _target(name, Path(path), endings)
@@ -240,6 +243,7 @@ def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
         raise OutputError(f"{path}: {name} is a directory, not a file")
     if endings and ending(path) not in endings:
         raise OutputError(f"{path}: {name} must end in {' or '.join(endings)}")
+    check_library_of(ending(path))
     return target
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.formats.registry import require
 from geounfold.io.formats.vtk import add_text, save
 
 
@@ -33,7 +34,7 @@ def write_polylines(
     line_data : dict of k texts
         A text for each line.
     """
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     size = np.diff(first)
     cells = np.empty(len(points) + len(size), dtype=np.int64)

@@ -258,7 +258,7 @@ def test_parquet_without_pyarrow_says_what_to_install(
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     _csv(tmp_path / "p.parquet", "PAR1")
-    with pytest.raises(MissingDependencyError, match="pip install pyarrow"):
+    with pytest.raises(MissingDependencyError, match=r"pip install 'geounfold\[parquet\]'"):
         read_table(tmp_path / "p.parquet")
 
 

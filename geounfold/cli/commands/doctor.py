@@ -15,6 +15,7 @@ from geounfold._version import __version__
 from geounfold.backends.system.libraries import system_name
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError, MissingDependencyError
+from geounfold.extras import check as check_library
 
 Progress = Callable[[str], None]
 
@@ -46,8 +47,8 @@ def check_up(progress: Progress) -> dict[str, Any]:
     dict
         ``geounfold``, ``python``, ``platform`` and ``processors``. ``libraries``, and ``extras``
         by extra, have the ``version`` of each library (None if it is missing), the version
-        ``needed``, and whether it is ``ok``. ``checks`` have, by name, ``ok`` and, if false, a
-        ``message``.
+        ``needed``, and whether it is ``ok``. ``checks`` have, by name, ``ok`` and, unless it is
+        true, a ``message``; it is None if the library is of an extra that is not installed.
     """
     libraries, extras = _libraries()
     return {
@@ -64,7 +65,7 @@ def check_up(progress: Progress) -> dict[str, Any]:
 def _check_health(found: dict[str, Any]) -> None:
     """Raise MissingDependencyError if a library that geounfold needs is missing or broken."""
     ill = [name for name, library in found["libraries"].items() if not library["ok"]]
-    ill += [name for name, check in found["checks"].items() if not check["ok"]]
+    ill += [name for name, check in found["checks"].items() if check["ok"] is False]
     if ill:
         raise MissingDependencyError(f"not in order: {', '.join(ill)}")
 
@@ -113,7 +114,10 @@ def _libraries() -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     return needed, extras
 
 
-_EXTRAS = ("formats", "geostat", "completion", "tetgen")  # for users, unlike dev
+_EXTRAS = (  # for users, unlike dev
+    *("view", "report", "parquet", "progress", "formats", "geostat"),
+    *("completion", "dask", "tetgen"),
+)
 
 
 def _library(requirement: Requirement) -> dict[str, Any]:
@@ -130,6 +134,11 @@ def _library(requirement: Requirement) -> dict[str, Any]:
 
 def _tried(name: str, check: Callable[[], None], progress: Progress) -> dict[str, Any]:
     progress(f"checking {name}")
+    try:
+        for library in _OPTIONAL.get(name, ()):
+            check_library(library, "pictures")
+    except MissingDependencyError as error:
+        return {"ok": None, "message": f"not installed: {error}"}
     try:
         check()
     except (GeounfoldError, ImportError, OSError) as error:
@@ -166,3 +175,6 @@ CHECKS: dict[str, Callable[[], None]] = {
     "off-screen rendering": _drawing,
 }
 """The checks by name; one raises if its library does not work."""
+
+_OPTIONAL = {"off-screen rendering": ("matplotlib", "pyvista")}
+"""Libraries of extras that a check needs, by the check's name."""

@@ -12,6 +12,7 @@ from geounfold.backends.own_process import call_apart
 from geounfold.comparison.crosscheck._options import MESHERS, CrossCheckOptions
 from geounfold.comparison.crosscheck._result import MeshFigures
 from geounfold.errors import BackendError, MissingDependencyError
+from geounfold.extras import check as check_library
 from geounfold.geometry.measures import boundary_faces, enclosed_volume, tet_volumes, unique_edges
 from geounfold.geometry.mesh import Floats, TetMesh, TriMesh
 from geounfold.geometry.tet_shapes import dihedral_angles, radius_ratios
@@ -44,6 +45,7 @@ def fill(name: str, surface: TriMesh, options: CrossCheckOptions) -> tuple[TetMe
             if name == "tetgen"
             else f"{name} is not installed: pip install {MESHERS[name]}"
         )
+    check_library("pyvista", f"meshes of {name}")  # both packages import it, and declare it not
     tight, _ = surface.submesh(np.arange(len(surface.F)))
     arguments: dict[str, np.ndarray | float] = {"V": tight.V, "F": tight.F, "edge": options.edge}
     if name == "tetwild":

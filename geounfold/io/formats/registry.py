@@ -10,6 +10,8 @@ from types import ModuleType
 import numpy as np
 
 from geounfold.errors import MissingDependencyError
+from geounfold.extras import check
+from geounfold.extras import require as require_library
 from geounfold.geometry.mesh import Floats, Ints
 
 Meta = Mapping[str, str]
@@ -102,7 +104,15 @@ _MESHES = (".ply", ".obj", ".stl", ".off")
 
 FORMATS = (
     Format("GSLIB (GeoEAS)", "gslib", _GSLIB, _GSLIB, numbers_only=True),
-    Format("VTK", "vtk", (".vtu", ".vtp", ".vti"), (".vtu", ".vtp"), (".vtp",), (".vtp",)),
+    Format(
+        "VTK",
+        "vtk",
+        (".vtu", ".vtp", ".vti"),
+        (".vtu", ".vtp"),
+        (".vtp",),
+        (".vtp",),
+        library="pyvista",
+    ),
     Format("GOCAD", "gocad", (".vs", ".ts"), (".vs",), (".ts",), (".ts",), numbers_only=True),
     Format("OMF", "omf", (".omf",), (".omf",), (".omf",), (".omf",), library="omf", elements=True),
     Format(
@@ -134,6 +144,15 @@ def find_format(kind: str, what: str) -> Format | None:
     return next((f for f in FORMATS if kind in getattr(f, what)), None)
 
 
+def check_library_of(kind: str) -> None:
+    """Raise MissingDependencyError if files of an ending need a library that is not installed."""
+    if kind == ".parquet":
+        check("pyarrow", "Parquet files")
+    for found in FORMATS:
+        if found.library and kind in (*found.writes_points, *found.writes_surface):
+            check(found.library, f"{found.name} files")
+
+
 def point_endings(*, writing: bool = False) -> tuple[str, ...]:
     """Return the endings of files of points that can be read, or written."""
     return sum((f.writes_points if writing else f.reads_points for f in FORMATS), ())
@@ -147,10 +166,8 @@ def surface_endings(*, writing: bool = False) -> tuple[str, ...]:
 def require(name: str, what: str) -> ModuleType:
     """Return an optional library; raise MissingDependencyError with its extra's name without it."""
     try:
-        return import_module(name)
-    except ImportError as error:
-        package = name.partition(".")[0]
-        where = " (from Python 3.12 on)" if package == "geoh5py" else ""
-        raise MissingDependencyError(
-            f"{what} files need {package}: pip install 'geounfold[formats]'{where}"
-        ) from error
+        return require_library(name, f"{what} files")
+    except MissingDependencyError as error:
+        if name.partition(".")[0] != "geoh5py":
+            raise
+        raise MissingDependencyError(f"{error} (from Python 3.12 on)") from error

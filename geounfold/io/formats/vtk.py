@@ -19,7 +19,7 @@ from geounfold.errors import InputError
 from geounfold.geometry.mesh import Floats
 from geounfold.io.formats.grids import places, with_sides
 from geounfold.io.formats.point_tables import flattened
-from geounfold.io.formats.registry import Meta, Points, Surface
+from geounfold.io.formats.registry import Meta, Points, Surface, require
 
 _META = ("unit", "crs")
 
@@ -64,7 +64,7 @@ def write_points(path: Path, points: Points) -> None:
 
 def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
     """Return points (n, 3) and their values (texts: object arrays) as pyvista poly data."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     mesh: Any = pyvista.PolyData(np.array(xyz, dtype=np.float64, order="C"))
     for name, values in data.items():
@@ -90,7 +90,7 @@ def read_surface(path: Path) -> Surface:
 
 def write_surface(path: Path, surface: Surface) -> None:
     """Write triangles as poly data."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     mesh = pyvista.PolyData.from_regular_faces(np.ascontiguousarray(surface.V), surface.F)
     _save(mesh, path, surface.meta)
@@ -98,9 +98,7 @@ def write_surface(path: Path, surface: Surface) -> None:
 
 def add_text(data: Any, name: str, words: Iterable[str]) -> None:
     """Add texts to a VTK object's point, cell or field data; pyvista itself takes ASCII only."""
-    from vtkmodules.vtkCommonCore import vtkStringArray
-
-    array = vtkStringArray()
+    array = require("vtkmodules.vtkCommonCore", "VTK").vtkStringArray()
     array.SetName(name)
     for word in words:
         array.InsertNextValue(str(word))
@@ -110,7 +108,7 @@ def add_text(data: Any, name: str, words: Iterable[str]) -> None:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Suppress VTK's messages on stderr; its error codes report the same."""
-    from vtkmodules.vtkCommonCore import vtkObject
+    vtkObject = require("vtkmodules.vtkCommonCore", "VTK").vtkObject
 
     shown = vtkObject.GetGlobalWarningDisplay()
     vtkObject.GlobalWarningDisplayOff()
@@ -121,7 +119,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _read(path: Path) -> Any:
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     try:
         with _quiet():
@@ -138,7 +136,7 @@ def _read(path: Path) -> Any:
 
 def _solid(mesh: Any) -> np.ndarray:
     """Return whether each cell has a volume, (n,)."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     if isinstance(mesh, pyvista.ImageData):
         return np.full(mesh.n_cells, min(mesh.dimensions) > 1 and bool(len(mesh.cell_data)))
@@ -158,7 +156,7 @@ def _with_sides(
     mesh: Any, values: dict[str, np.ndarray], keep: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the values of kept cells, with their sides if all of them are boxes."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     if isinstance(mesh, pyvista.ImageData):
         ijk = places([n - 1 for n in mesh.dimensions], "u")[keep]
@@ -170,7 +168,7 @@ def _with_sides(
 
 def _box_sides(mesh: Any, keep: np.ndarray) -> Floats | None:
     """Return the sides (n, 3) of kept cells; None unless all are boxes of one cell type."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     # Of a cell's eight corners: the ends of the three edges from the first, and the opposite one.
     ends = {
@@ -200,7 +198,7 @@ def _spacing(points: Any) -> float:
 
 def _is_cloud(mesh: Any) -> bool:
     """Return whether there is one vertex cell for each point and nothing else."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     if mesh.n_cells != mesh.n_points:
         return False
@@ -245,9 +243,8 @@ def save(mesh: Any, path: Path) -> None:
     OSError
         The file could not be written whole.
     """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
-
-    kinds = {".vtp": vtkXMLPolyDataWriter, ".vtu": vtkXMLUnstructuredGridWriter}
+    xml = require("vtkmodules.vtkIOXML", "VTK")
+    kinds = {".vtp": xml.vtkXMLPolyDataWriter, ".vtu": xml.vtkXMLUnstructuredGridWriter}
     writer = kinds[path.suffix.lower()]()
     writer.SetFileName(str(path))
     writer.SetInputData(mesh)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from geounfold.errors import MissingDependencyError
+from geounfold.extras import require
 from geounfold.io.column_values import TextKind
 
 if TYPE_CHECKING:
@@ -23,12 +23,8 @@ def pyarrow_module() -> ModuleType:
     MissingDependencyError
         pyarrow is not installed.
     """
-    try:
-        import pyarrow.parquet
-    except ImportError as error:
-        raise MissingDependencyError("Parquet files need pyarrow: pip install pyarrow") from error
-    module: ModuleType = pyarrow
-    return module
+    require("pyarrow.parquet", "Parquet files")
+    return require("pyarrow", "Parquet files")
 
 
 class ParquetParts:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geounfold.errors import MissingDependencyError, OptionError
+from geounfold.errors import OptionError
+from geounfold.extras import require as require_library
 
 Image = NDArray[np.uint8]
 
@@ -50,11 +50,5 @@ class ViewOptions:
 
 
 def require(name: str) -> Any:
-    """Import an optional library; raise MissingDependencyError with the command to install it."""
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"pictures need {name.partition('.')[0]}, which cannot be imported ({error}): "
-            "pip install matplotlib pyvista"
-        ) from error
+    """Return a library for pictures; see `extras.require`."""
+    return require_library(name, "pictures")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -169,9 +170,10 @@ def test_options_check_themselves(options, message):
         ViewOptions(**options)
 
 
-def test_a_missing_python_library_is_named_with_its_cure():
-    with pytest.raises(MissingDependencyError, match=r"nowhere.*pip install matplotlib pyvista"):
-        style.require("nowhere.to.be.found")
+def test_a_missing_python_library_is_named_with_its_cure(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingDependencyError, match=r"need pyvista: .*geounfold\[view\]"):
+        style.require("pyvista")
 
 
 @pytest.mark.parametrize(

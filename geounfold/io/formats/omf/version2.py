@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from geounfold.extras import require
 from geounfold.geometry.mesh import Floats
 from geounfold.io.formats.elements import Element, Kind
 from geounfold.io.formats.grids import Blocks, Grid, places, regular_grid, tensor_grid
@@ -49,7 +50,7 @@ class _File:
 
     def table(self, entry: dict[str, Any]) -> Any:
         """Return an array as a table of pyarrow."""
-        from pyarrow import parquet
+        parquet = require("pyarrow.parquet", "OMF 2 files")
 
         with zipfile.ZipFile(self.path) as archive:
             content = archive.read(entry["filename"])
@@ -178,8 +179,8 @@ def _plain(table: Any) -> np.ndarray:
 
     Dates become texts; vectors and colours become rows of an (n, wide) array.
     """
-    import pyarrow as pa
-    from pyarrow import compute
+    pa = require("pyarrow", "OMF 2 files")
+    compute = require("pyarrow.compute", "OMF 2 files")
 
     column = table.column(0).combine_chunks()
     if pa.types.is_struct(column.type):
@@ -193,8 +194,8 @@ def _plain(table: Any) -> np.ndarray:
 
 def _numbers(column: Any) -> np.ndarray:
     """Return a column of numbers; if values are missing, as floats with NaN."""
-    import pyarrow as pa
-    from pyarrow import compute
+    pa = require("pyarrow", "OMF 2 files")
+    compute = require("pyarrow.compute", "OMF 2 files")
 
     if pa.types.is_boolean(column.type):
         column = compute.cast(column, pa.int8())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -46,9 +47,13 @@ def test_every_module_offers_what_it_is_registered_for() -> None:
                     assert hasattr(module, f"{verb}_{kind}") or hasattr(module, f"{verb}_{frame}")
 
 
-def test_a_missing_library_is_named_with_its_cure(tmp_path: Path) -> None:
-    with pytest.raises(MissingDependencyError, match=r"no_such_library.*geounfold\[formats\]"):
-        require("no_such_library.part", "Odd")
+def test_a_missing_library_is_named_with_its_cure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "ezdxf.render", None)
+        with pytest.raises(MissingDependencyError, match=r"Odd.*ezdxf.*geounfold\[formats\]"):
+            require("ezdxf.render", "Odd")
     for kind, name in NEEDS.items():
         if importlib.util.find_spec(name) is None:
             path = tmp_path / f"t{kind}"

@@ -37,12 +37,14 @@ if TYPE_CHECKING:
     from geounfold.io.block_sizes import block_model
     from geounfold.io.solids import fill
     from geounfold.mapping.control_mesh import ControlMesh
-    from geounfold.mapping.mesh_map import UnfoldingMap, load
+    from geounfold.mapping.domain_map import DomainMap, load
+    from geounfold.mapping.mesh_map import UnfoldingMap
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
     from geounfold.quality.truth import aligned_rms
     from geounfold.synthetic import simulate
     from geounfold.synthetic.faulted import simulate_faulted
     from geounfold.unfolding.dask_map import map_partitions
+    from geounfold.unfolding.domains import Domains, unfold_domains
     from geounfold.unfolding.options import UnfoldOptions
     from geounfold.unfolding.result import Unfolding
     from geounfold.unfolding.run import unfold
@@ -76,7 +78,8 @@ _HOMES = {
     "Flattening": "flattening",
     "flatten": "flattening",
     "UnfoldingMap": "mapping.mesh_map",
-    "load": "mapping.mesh_map",
+    "load": "mapping.domain_map",
+    "DomainMap": "mapping.domain_map",
     "map_partitions": "unfolding.dask_map",
     "TetMesh": "geometry.mesh",
     "TriMesh": "geometry.mesh",
@@ -84,6 +87,8 @@ _HOMES = {
     "Unfolder": "unfolding.sklearn_unfolder",
     "Unfolding": "unfolding.result",
     "unfold": "unfolding.run",
+    "Domains": "unfolding.domains",
+    "unfold_domains": "unfolding.domains",
     "aligned_rms": "quality",
     "epsilon": "quality",
     "neighbours": "quality",
@@ -97,6 +102,8 @@ __all__ = [
     "BlockModel",
     "ControlMesh",
     "CrossCheck",
+    "DomainMap",
+    "Domains",
     "DrillHoles",
     "Estimation",
     "FilledSolid",
@@ -135,6 +142,7 @@ __all__ = [
     "simulate_faulted",
     "transfer",
     "unfold",
+    "unfold_domains",
 ]
 
 

@@ -40,6 +40,10 @@ class TrustError(InputError):
     """The layers of the answer are not to be trusted, and ``strict`` was asked for."""
 
 
+class DomainError(GeounfoldError):
+    """Some domains of a model failed; the others have their results."""
+
+
 class MeshError(GeounfoldError):
     """A mesh is malformed: an index out of range, a wrong shape, a wrong topology."""
 

@@ -188,12 +188,12 @@ def write_arrays(path: str | Path | BinaryIO, arrays: Mapping[str, NDArray[Any]]
     np.savez_compressed(stream, **whole, checksum=np.array(_checksum(whole)))  # type: ignore[arg-type]
     if isinstance(path, str | os.PathLike):
         name = os.fspath(path)
-        _write_whole(Path(name if name.endswith(".npz") else f"{name}.npz"), stream.getvalue())
+        write_whole(Path(name if name.endswith(".npz") else f"{name}.npz"), stream.getvalue())
     else:
         path.write(stream.getvalue())
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write a file beside its destination and move it there."""
     target = path.resolve()
     part = target.with_name(f".geounfold-{uuid.uuid4().hex}.part")
@@ -220,7 +220,11 @@ def read_arrays(path: str | Path) -> Arrays:
         has arrays that do not fit.
     """
     path = Path(path)
-    content = _content(path)
+    return arrays_of(_content(path), path)
+
+
+def arrays_of(content: bytes, path: Path) -> Arrays:
+    """Return the arrays of a map file's bytes, as `read_arrays`; ``path`` is for messages."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = _members(archive, len(content), path)

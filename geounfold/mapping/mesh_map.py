@@ -21,7 +21,7 @@ from geounfold.mapping.carried import Carried, Returned, checked_points
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients
 from geounfold.mapping.fault_space import JoinedSpace
-from geounfold.mapping.map_file import read_arrays, write_arrays
+from geounfold.mapping.map_file import arrays_of, read_arrays, write_arrays
 from geounfold.mapping.mesh_space import MeshImage, MeshSpace
 from geounfold.mapping.parts_space import MapParts, PartsSpace, part_elements, part_spaces
 from geounfold.mapping.prism_coordinates import COORDINATES, PrismInterpolant
@@ -442,6 +442,11 @@ def load(path: str | Path) -> UnfoldingMap:
         No such file, not a map, of another version, or damaged.
     """
     return _of_arrays(read_arrays(path))
+
+
+def of_bytes(content: bytes, path: Path) -> UnfoldingMap:
+    """Return the map in a map file's bytes; ``path`` is for messages."""
+    return _of_arrays(arrays_of(content, path))
 
 
 def _of_arrays(arrays: dict[str, np.ndarray]) -> UnfoldingMap:

@@ -107,7 +107,7 @@ class UnfoldedBody:
     def _table_columns(self, frame: pd.DataFrame, points: Floats, rows: slice) -> dict[str, Any]:
         """Return the output columns of a batch of rows."""
         world = {} if self._body.frame is None else world_columns(points)
-        found = _results(self._result, rows, self._asked)
+        found = block_results(self._result, rows, self._asked)
         return {**world, **found, **self._body.volumes.columns(frame, found)}
 
     def _write_report(self, path: Path) -> None:
@@ -120,7 +120,7 @@ class UnfoldedBody:
             self.summary,
             table.points,
             result.points,
-            report_columns(table, _results(result, slice(0, len(table)), self._asked)),
+            report_columns(table, block_results(result, slice(0, len(table)), self._asked)),
             holes=report_holes(body.holes, self._holes, body.samples, self._samples),
             faults=carried_faults(result),
             exploration=self._exploration,
@@ -137,7 +137,7 @@ class UnfoldedBody:
         return found
 
 
-def _results(result: Unfolding, rows: slice, asked: Sequence[str] = ()) -> dict[str, Any]:
+def block_results(result: Unfolding, rows: slice, asked: Sequence[str] = ()) -> dict[str, Any]:
     """Return the results of some of the blocks, by output column; ``asked``: columns on request."""
     distortion = {name: values[rows] for name, values in result.columns.items()}
     asked_for = {name: getattr(result, name)[rows] for name in asked}

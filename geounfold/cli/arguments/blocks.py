@@ -7,6 +7,7 @@ from typing import Any
 from geounfold.cli.arguments.groups import (
     add_block_size,
     add_command,
+    add_domain,
     add_element,
     add_frame,
     add_grade_values,
@@ -96,6 +97,7 @@ def add_grid(commands: Any) -> Parser:
     group.add("-o", "--output", metavar="GRID", required=True, help=f"the blocks: {TABLES}")
     group.add("--sizes", metavar="X,Y,Z", required=True, help="sides of a block")
     group.add("--map", metavar="M.npz", help="keep only blocks with a part in this map's body")
+    add_domain(group)
     parser.set_defaults(drop_invalid=False)
     return parser
 
@@ -139,6 +141,7 @@ def add_transfer(commands: Any) -> Parser:
     for side in ("source", "target"):
         add_element(group, f"{side}-element", side.upper())
     add_grade_values(group)
+    add_domain(group)
     group.add(
         "--drop-invalid", action="store_true", rare=True, help="leave out rows without coordinates"
     )

@@ -7,6 +7,7 @@ from typing import Any
 from geounfold.cli.arguments.groups import (
     add_columns,
     add_command,
+    add_domain,
     add_grade_values,
     add_samples_choice,
 )
@@ -57,6 +58,7 @@ def add_estimate(commands: Any) -> Parser:
     group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
     add_samples_choice(group)
     add_grade_values(group, rare=False)
+    add_domain(group)
     add_columns(group)
     group = parser.section("outputs")
     group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")

@@ -58,6 +58,19 @@ def add_element(section: Section, name: str, whose: str) -> None:
     )
 
 
+def add_domain(section: Section) -> None:
+    """Add the options for a map of several domains."""
+    section.add(
+        "--by",
+        metavar="COLUMN",
+        rare=True,
+        help="column of the domains, of a map of several (default: as in `geounfold unfold --by`)",
+    )
+    section.add(
+        "--domain", metavar="NAME", rare=True, help="the one domain to take of a map of several"
+    )
+
+
 def add_samples_choice(section: Section) -> None:
     """Add the options that choose samples."""
     section.add(

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from geounfold.cli.arguments.groups import add_columns, add_command, add_frame, add_holes
+from geounfold.cli.arguments.groups import (
+    add_columns,
+    add_command,
+    add_domain,
+    add_frame,
+    add_holes,
+)
 from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.texts import (
     ANGLES,
@@ -62,6 +68,7 @@ def add_map(commands: Any, *, holes: bool) -> Parser:
     )
     group.add("--inverse", action="store_true", help="from the unfolded to the folded space")
     add_columns(group)
+    add_domain(group)
     add_frame(group, "POINTS")
     group = parser.section("drill-holes, instead of POINTS")
     add_holes(group)

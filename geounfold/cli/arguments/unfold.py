@@ -61,6 +61,7 @@ def add_unfold(commands: Any) -> Parser:
         help="block centroids, or a closed surface to fill",
     )
     add_columns(group)
+    group.add("--by", metavar="COLUMN", help="unfold every domain that a column names on its own")
     group.add(
         "--sizes",
         metavar="X,Y,Z",

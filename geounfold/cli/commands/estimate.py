@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
+from geounfold.cli.domains.estimate import estimate_by
+from geounfold.cli.domains.maps import domains_of, load_map
 from geounfold.cli.inputs.points import files_given, read_all, read_samples
 from geounfold.cli.inputs.unfold_options import command_line
 from geounfold.cli.terminal.console import Console
@@ -13,6 +16,9 @@ from geounfold.errors import OptionError
 from geounfold.io import Outputs, write_json
 from geounfold.io.paths import existing_file
 from geounfold.io.tables.parted import PartedTable
+
+if TYPE_CHECKING:
+    from geounfold.mapping.mesh_map import UnfoldingMap
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -26,12 +32,19 @@ def run(args: Namespace, console: Console) -> None:
         watcher=console.journal,
     )
     existing_file(Path(args.map))
-    table = PartedTable.chosen(read_all(args.points, args, console))
-    table.check_writable(args.output)
+    whole = read_all(args.points, args, console)
+    whole.check_writable(args.output)
     samples = read_samples(args, console)
     if samples is None:
         raise OptionError("estimate needs SAMPLES")
-    result = estimation(args, samples, table, console.stage)
+    saved = load_map(args)
+    several = domains_of(saved)
+    if several is not None:
+        estimate_by(args, console, several, outputs, samples, whole)
+        return
+    table = PartedTable.chosen(whole)
+    one = cast("UnfoldingMap", saved)
+    result = estimation(args, one, samples, table.points, console.stage)
     summary = {**summarised(args, result, console.stage), "command": command_line(args)}
     with outputs.writing() as parts:
         table.write(parts["--output"], result.columns)

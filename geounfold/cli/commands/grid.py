@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pandas as pd
 
+from geounfold.cli.domains.maps import domain_parts, domains_of, load_map
 from geounfold.cli.inputs.numbers import three_numbers
 from geounfold.cli.inputs.points import files_given, read_table, where_of
 from geounfold.cli.terminal.console import Console
@@ -20,7 +22,9 @@ from geounfold.io.tables.files import write_table
 
 if TYPE_CHECKING:
     from geounfold.body.block_model import BlockModel
-    from geounfold.geometry.mesh import Bools
+    from geounfold.geometry.mesh import Bools, Floats
+    from geounfold.io import PointTable
+    from geounfold.mapping.mesh_map import UnfoldingMap
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -41,20 +45,47 @@ def run(args: Namespace, console: Console) -> None:
     ).only()  # fmt: skip
     from geounfold.body.block_model import regular_grid
 
-    console.stage("making the grid")
-    blocks = regular_grid(table.points, np.array(sides))
-    kept = np.ones(len(blocks), dtype=bool)
-    if args.map is not None:
-        console.stage("finding the blocks in the body")
-        kept = _in_body(args.map, blocks)
+    grids, covering = [], 0
+    for points, saved, more in _domains(args, table, console):
+        console.stage("making the grid")
+        blocks = regular_grid(points, np.array(sides))
+        kept = np.ones(len(blocks), dtype=bool)
+        if saved is not None:
+            console.stage("finding the blocks in the body")
+            kept = _in_body(args.map, saved, blocks)
+        covering += len(blocks)
+        grids.append(_grid_table(blocks, kept).assign(**more))
+    grid = pd.concat(grids, ignore_index=True)
     with outputs.writing() as parts:
-        write_table(parts["--output"], _grid_table(blocks, kept))
-    count = int(np.count_nonzero(kept))
-    console.done(f"{count} blocks written into {args.output}")
-    console.answer({"blocks": count, "covering": len(blocks), "sizes": list(sides)})
+        write_table(parts["--output"], grid)
+    console.done(f"{len(grid)} blocks written into {args.output}")
+    console.answer({"blocks": len(grid), "covering": covering, "sizes": list(sides)})
 
 
-def _in_body(path: str, blocks: BlockModel) -> Bools:
+def _domains(
+    args: Namespace, table: PointTable, console: Console
+) -> Iterator[tuple[Floats, UnfoldingMap | None, dict[str, str]]]:
+    """Yield the points of every domain, its map, and the column that names it.
+
+    Without a map of domains and --by, all points are one domain without a name.
+    """
+    saved = None if args.map is None else load_map(args)
+    several = None if saved is None else domains_of(saved)
+    if several is not None:
+        parted, _ = domain_parts(table, several, args, console, inverse=True)
+        for k, (name, one) in enumerate(several.items()):
+            rows = parted.rows_of(k)
+            if rows.any():
+                yield table.points[rows], one, {several.column: name}
+    elif args.by is not None:
+        codes, names = table.categories(args.by)
+        for code, name in enumerate(names):
+            yield table.points[codes == code], None, {args.by: name}
+    else:
+        yield table.points, cast("UnfoldingMap | None", saved), {}
+
+
+def _in_body(path: str, saved: UnfoldingMap, blocks: BlockModel) -> Bools:
     """Return which unfolded blocks have a part in the control mesh of a saved map, (n,).
 
     Raises
@@ -63,9 +94,7 @@ def _in_body(path: str, blocks: BlockModel) -> Bools:
         No block has one.
     """
     from geounfold.backends.threads import slices
-    from geounfold.mapping import mesh_map
 
-    saved = mesh_map.load(path)
     kept = np.zeros(len(blocks), dtype=bool)
     for rows in slices(len(blocks), 1 << 15):
         parts = blocks.sub_points(2, rows)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from geounfold.cli.answers.file_endings import POINTS_OUT, SURFACES_OUT, TRACES
 from geounfold.cli.answers.locations import flat_columns, outside_warnings, place_counts
+from geounfold.cli.domains.maps import domain_parts, domains_of, load_map, one_map
+from geounfold.cli.domains.unfold import carried_holes
 from geounfold.cli.inputs.drillholes import check_hole_options, read_holes
 from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import files_given, open_table, triple
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
 
     from geounfold.body.model_frame import ModelFrame
     from geounfold.geometry.mesh import Floats
+    from geounfold.io import PointTable
+    from geounfold.io.tables.large import PointStream
+    from geounfold.mapping.domain_map import DomainMap
     from geounfold.mapping.mesh_map import UnfoldingMap
 
 
@@ -79,29 +85,39 @@ def _carry_points(
     args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
 ) -> None:
     """Carry a table, drill-holes, or both."""
-    table = None
+    saved = load_map(args)
+    several = domains_of(saved)
+    table: PointTable | PointStream | PartedTable | None = None
+    carryings: list[_Carrying] = []
     if args.points is not None:
         prefer = (UNFOLDED,) if args.inverse else ()
-        opened = open_table(args, console, prefer, frame=frame, keep=False)
-        table = PartedTable.chosen(opened)
+        opened = open_table(args, console, prefer, frame=frame, keep=several is not None)
+        if several is None:
+            table = PartedTable.chosen(opened)
+            carryings = [_Carrying(cast("UnfoldingMap", saved), frame, args)]
+        else:
+            table, carryings = _by_domain(several, opened, frame, args, console)
     holes = read_holes(args, console, where="where" if args.points is None else "")
-    from geounfold.mapping import mesh_map
-
-    saved = mesh_map.load(args.map)
     console.stage("carrying points")
-    carrying = _Carrying(saved, frame, inverse=args.inverse)
-    traced = {} if holes is None else holes.carried(flat_columns(saved))
+    if several is not None:
+        traced = carried_holes(several, args.by or several.column, holes)
+    else:
+        flat = flat_columns(cast("UnfoldingMap", saved))
+        traced = {} if holes is None else holes.carried(flat)
     with outputs.writing() as parts:
         if table is not None:
-            table.write_parts(parts["--output"], carrying.columns)
+            table.write_parts(parts["--output"], *(c.columns for c in carryings))
         if holes is not None:
             holes.write(parts, traced)
     counts = {name: place_counts(found) for name, found in traced.items() if found}
     warnings = []
     if table is not None:
-        counts = {"points": dict(carrying.counts), **counts}
-        warnings = outside_warnings(args.points, counts["points"])
-        warnings += carrying.unsolved_warnings(args.points)
+        total = sum((c.counts for c in carryings), Counter({"carried": 0}))
+        points = {word: total[word] for word in ("carried", "extrapolated", "outside")}
+        counts = {"points": points, **counts}
+        warnings = outside_warnings(args.points, points)
+        for carrying in carryings:
+            warnings += carrying.unsolved_warnings(args.points)
     for name in traced:
         warnings += outside_warnings(f"the holes' {name}", counts[name])
     for warning in warnings:
@@ -112,11 +128,38 @@ def _carry_points(
     console.answer(counts)
 
 
+def _by_domain(
+    maps: DomainMap,
+    table: PointTable | PointStream,
+    frame: ModelFrame | None,
+    args: Namespace,
+    console: Console,
+) -> tuple[PartedTable, list[_Carrying]]:
+    """Return a table divided by the domains of a map, and what carries each part."""
+    parted, own = domain_parts(table, maps, args, console, inverse=args.inverse)
+    named = [{} if own else {maps.column: name} for name in maps]
+    carryings = [
+        _Carrying(saved, frame, args, more)
+        for saved, more in zip(maps.values(), named, strict=True)
+    ]
+    if not own:  # the last part: points that no map reaches
+        nearest = next(iter(maps.values()))
+        carryings.append(_Carrying(nearest, frame, args, {maps.column: ""}))
+    return parted, carryings
+
+
 class _Carrying:
     """Output columns of points, batch by batch, and counts over all batches."""
 
-    def __init__(self, saved: UnfoldingMap, frame: ModelFrame | None, *, inverse: bool) -> None:
-        self._saved, self._frame, self._inverse = saved, frame, inverse
+    def __init__(
+        self,
+        saved: UnfoldingMap,
+        frame: ModelFrame | None,
+        args: Namespace,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
+        self._saved, self._frame, self._inverse = saved, frame, args.inverse
+        self._more = more or {}
         self.counts: Counter[str] = Counter()
         self._unsolved = 0
 
@@ -126,7 +169,9 @@ class _Carrying:
         found = result_columns(FOLDED if self._inverse else UNFOLDED, carried)
         self.counts.update(place_counts(found))
         self._unsolved += carried.unsolved if self._inverse else 0
-        return found if self._frame is None else {**world_columns(points), **found}
+        own = {name: np.full(len(points), word) for name, word in self._more.items()}
+        world = {} if self._frame is None else world_columns(points)
+        return {**own, **world, **found}
 
     def unsolved_warnings(self, source: str) -> list[str]:
         """Return the warning of points in the control mesh without an inverse."""
@@ -148,7 +193,6 @@ def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Consol
         )
     from geounfold.io.outputs import whole_folder
     from geounfold.io.tables.parts import parts_of
-    from geounfold.mapping import mesh_map
     from geounfold.unfolding.dask_map import Carrying, carry_folder
 
     existing_file(Path(args.map))
@@ -157,7 +201,7 @@ def _carry_on_cluster(args: Namespace, frame: ModelFrame | None, console: Consol
     place = None if frame is None else frame.to_world
     how = Carrying(triple(args.columns), args.inverse, args.drop_invalid, kind, place)
     with whole_folder(args.output, overwrite=args.overwrite, watcher=console.journal) as folder:
-        saved = mesh_map.load(args.map)
+        saved = one_map(args)
         console.stage(f"looking through {args.points}")
         parts = parts_of(args.points)
         console.stage("carrying points")
@@ -187,9 +231,7 @@ def _carry_surface(
     if args.where is not None:
         raise OptionError(f"--where chooses rows of a table; {args.points} is a surface")
     mesh, meta = read_surface_with_meta(args.points, args.element)
-    from geounfold.mapping import mesh_map
-
-    saved = mesh_map.load(args.map)
+    saved = one_map(args)
     console.stage("carrying vertices")
     vertices = mesh.V if frame is None else frame.to_world(mesh.V)
     carried = saved.carry(vertices, inverse=args.inverse)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from geounfold.cli.answers.file_endings import HTML, JSON, MAP, POINTS_OUT, TRACES, VTU
 from geounfold.cli.answers.unfolded import UnfoldedBody
+from geounfold.cli.domains.unfold import check_by, unfold_by
 from geounfold.cli.inputs.body import read_body
 from geounfold.cli.inputs.drillholes import check_hole_options
 from geounfold.cli.inputs.grades import check_grade_options, exploration
@@ -26,12 +27,16 @@ def run(args: Namespace, console: Console) -> None:
         raise OptionError("--samples and --samples-out belong together: give both or neither")
     check_hole_options(args)
     check_grade_options(args)
+    check_by(args)
     outputs = _outputs(args, console)
     if args.report is not None:
         _check_rendering(console)
     options = unfold_options(args)
     _check_mesh_outputs(args, options)
     body = read_body(args, console)
+    if args.by is not None:
+        unfold_by(args, console, outputs, options, body)
+        return
     from geounfold.unfolding import run as unfolding
 
     result = unfolding.unfold(

@@ -17,19 +17,21 @@ from geounfold.io.paths import existing_file
 
 if TYPE_CHECKING:
     from geounfold.estimation import Estimation, Variogram
+    from geounfold.geometry.mesh import Floats
     from geounfold.io import PointTable
-    from geounfold.io.tables.parted import PartedTable
+    from geounfold.mapping.mesh_map import UnfoldingMap
 
 _WHOLE = ("min_samples", "max_samples", "max_per_hole")
 
 
 def estimation(
     args: Namespace,
+    saved: UnfoldingMap,
     samples: PointTable,
-    blocks: PointTable | PartedTable,
+    blocks: Floats,
     stage: Callable[[str], None],
 ) -> Estimation:
-    """Return the estimates on the blocks.
+    """Return the estimates on blocks, given by their centroids (n, 3).
 
     Raises
     ------
@@ -48,12 +50,10 @@ def estimation(
     cells = _cells(args.decluster)
     variogram = None if args.variogram is None else _variogram(args.variogram)
     from geounfold.estimation import estimate
-    from geounfold.mapping import mesh_map
 
-    saved = mesh_map.load(args.map)
     stage("estimating")
     return estimate(
-        saved, _table(samples, args), blocks.points, variogram,
+        saved, _table(samples, args), blocks, variogram,
         grade=args.grade, method=args.method, neighbourhood=near,
         mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
         soft_boundary=soft, all_blocks=args.all_blocks,

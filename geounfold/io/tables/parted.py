@@ -107,9 +107,8 @@ class PartedTable:
 
     def write(self, path: str | Path, columns: Mapping[str, Any]) -> None:
         """Write the table with results, given for the rows of all parts in the file's order."""
-        kept = {name: np.asarray(values) for name, values in columns.items()}
         one = PartedTable(self.table, np.where(self.part >= 0, 0, self.part))
-        one.write_parts(path, lambda _, __, rows: {n: v[rows] for n, v in kept.items()})
+        one.write_parts(path, sliced(columns))
 
     def write_parts(self, path: str | Path, *makes: Make) -> None:
         """Write the table with the results that one function returns for each part."""
@@ -126,6 +125,12 @@ class PartedTable:
             return spread_columns(found, own)
 
         self.table.write_parts(path, spread)
+
+
+def sliced(columns: Mapping[str, Any]) -> Make:
+    """Return what writes a part's results, given for all of its rows."""
+    kept = {name: np.asarray(values) for name, values in columns.items()}
+    return lambda _, __, rows: {name: values[rows] for name, values in kept.items()}
 
 
 def spread_columns(found: Sequence[tuple[Ints, Mapping[str, Any]]], part: Ints) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Commands on several domains of one model: --by COLUMN, and maps that hold several domains."""

@@ -1,0 +1,282 @@
+"""Several domains of one model, every one unfolded on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pandas as pd
+
+from geounfold.errors import DomainError, GeounfoldError, InputError
+from geounfold.geometry.mesh import Ints
+from geounfold.io.result_columns import UNFOLDED, result_columns
+from geounfold.io.selection import column_position, read_where
+from geounfold.io.selection.labels import codes_of
+from geounfold.io.tables.parted import spread_columns
+from geounfold.io.tables.points import chosen_rows
+from geounfold.mapping.domain_map import DomainMap
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.unfolding.options import UnfoldOptions
+from geounfold.unfolding.result import Unfolding
+from geounfold.unfolding.run import unfold
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Domains(Mapping[str, Unfolding]):
+    """The unfolded domains of a model, by name; those that failed are named apart.
+
+    Attributes
+    ----------
+    column : str
+        Column that names the domains.
+    results : dict of Unfolding
+        By the domain's name.
+    failures : dict of GeounfoldError
+        Why a domain could not be unfolded, by its name.
+    blocks : dict of int
+        Number of blocks of every domain.
+    given : DataFrame or None
+        The model.
+    part : (n,) int
+        Position of each row's domain among `results`; -1 if the row was not selected, -2 if its
+        domain has no result.
+    """
+
+    column: str
+    results: Mapping[str, Unfolding]
+    failures: Mapping[str, GeounfoldError]
+    blocks: Mapping[str, int]
+    given: pd.DataFrame | None
+    part: Ints
+
+    def __getitem__(self, name: str) -> Unfolding:
+        return self.results[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.results)
+
+    def __len__(self) -> int:
+        return len(self.results)
+
+    def __repr__(self) -> str:
+        failed = f"; failed: {', '.join(self.failures)}" if self.failures else ""
+        return f"Domains(by {self.column}: {', '.join(self.results)}{failed})"
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The model with all results, the rows in order.
+
+        The location of rows without a result is ``elsewhere``, or ``not selected``.
+        """
+        if self.given is None:
+            raise InputError("the domains were not given as a DataFrame")
+        divided = any(u.junctions for u in self.values())
+        found = []
+        for k, u in enumerate(self.values()):
+            columns = {**result_columns(UNFOLDED, u.carried), **u.columns}
+            if divided:
+                columns["body_part"] = u.body_part
+            found.append((np.flatnonzero(self.part == k), columns))
+        return self.given.assign(**spread_columns(found, self.part))
+
+    @property
+    def rows(self) -> pd.DataFrame:
+        """A row per domain: blocks, outcome, trust, figures, seconds, error."""
+        return pd.DataFrame(self.facts())
+
+    def facts(self) -> list[dict[str, Any]]:
+        """Return a row per domain, in the order of their names, for a summary."""
+        return [
+            _result_row(name, self.results[name])
+            if name in self.results
+            else _failure_row(name, count, self.failures[name])
+            for name, count in self.blocks.items()
+        ]
+
+    @property
+    def map(self) -> DomainMap:
+        """The maps of all domains.
+
+        Raises
+        ------
+        InputError
+            The method has no control mesh.
+        """
+        maps = {}
+        for name, u in self.items():
+            if not isinstance(u.map, UnfoldingMap):
+                raise InputError(f"method {u.options.method} has no map that can be saved")
+            maps[name] = u.map
+        return DomainMap(self.column, maps)
+
+    def save(self, path: str | Path | BinaryIO) -> None:
+        """Write the maps of all domains into one file; ``geounfold.load`` reads it."""
+        self.map.save(path)
+
+    def check(self) -> None:
+        """Raise DomainError if a domain failed; the first one's error if all did."""
+        if not self.failures:
+            return
+        first = next(iter(self.failures))
+        if not self.results:
+            raise type(self.failures[first])(f"{self.column} {first}: {self.failures[first]}")
+        told = "; ".join(f"{name}: {error}" for name, error in self.failures.items())
+        raise DomainError(
+            f"{len(self.failures)} of {len(self.blocks)} domains failed, the others are there: "
+            f"{told}"
+        )
+
+
+def unfold_domains(
+    points: pd.DataFrame,
+    by: str,
+    options: UnfoldOptions | None = None,
+    *,
+    where: str | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Domains:
+    """Unfold every domain of a model on its own.
+
+    Parameters
+    ----------
+    points : DataFrame
+        The model: centroids, in columns found by name, and the column of the domains.
+    by : str
+        Column that names each block's domain; a block without a name is in none.
+    options : UnfoldOptions, optional
+        Options of every domain.
+    where : str, optional
+        Chooses rows, such as ``"DOMAIN!=WASTE"``.
+    progress : callable, optional
+        Called with every stage's name as it starts, the domain's name before it.
+    **changes
+        Fields of UnfoldOptions given by name.
+
+    Returns
+    -------
+    Domains
+        The unfoldings by name. A domain that fails is in ``failures`` and leaves the others
+        standing.
+
+    Raises
+    ------
+    InputError
+        No such column, or no row is chosen.
+    GeounfoldError
+        All domains failed; the error is that of the first.
+
+    Examples
+    --------
+    >>> import geounfold as gu
+    >>> X = gu.simulate("sim_case_1").folded
+    >>> model = pd.DataFrame(np.concatenate([X, X + 500]), columns=["x", "y", "z"])
+    >>> model["LODE"] = np.repeat(["A", "B"], len(X))
+    >>> gu.unfold_domains(model, "LODE")
+    Domains(by LODE: A, B)
+    """
+    position = column_position([str(name) for name in points.columns], by, "the table")
+    chosen = np.ones(len(points), dtype=bool)
+    if where is not None:
+        chosen = chosen_rows(read_where(where), points, "the table")
+    codes, names = codes_of([points.iloc[:, position]])
+    codes = np.where(chosen, codes, -1)
+
+    def run(rows: Ints, stage: Progress | None) -> Unfolding:
+        return unfold(points.iloc[rows], options, progress=stage, **changes)
+
+    results, failures, blocks = each_domain(codes, names, run, progress)
+    part = parts_of_rows(codes, names, list(results), chosen)
+    column = str(points.columns[position])
+    found = Domains(column, results, failures, blocks, points.copy(), part)
+    if not results:
+        found.check()
+    return found
+
+
+def each_domain(
+    codes: Ints,
+    names: list[str],
+    run: Callable[[Ints, Progress | None], Any],
+    progress: Progress | None,
+) -> tuple[dict[str, Any], dict[str, GeounfoldError], dict[str, int]]:
+    """Run every domain that has rows; return results, failures and numbers of rows by name.
+
+    Parameters
+    ----------
+    codes : (n,) int
+        Domain of each row; -1 for none.
+    names : list of str
+        Names of the domains.
+    run : callable
+        Returns the result of some rows (k,), given these and what to call at each stage.
+    progress : callable, optional
+        Called with every stage's name.
+
+    Raises
+    ------
+    InputError
+        No row has a domain.
+    """
+    results: dict[str, Any] = {}
+    failures: dict[str, GeounfoldError] = {}
+    blocks: dict[str, int] = {}
+    for code, name in enumerate(names):
+        rows = np.flatnonzero(codes == code)
+        if not len(rows):
+            continue
+        blocks[name] = len(rows)
+
+        def stage(what: str, name: str = name) -> None:
+            if progress is not None:
+                progress(f"{name}: {what}")
+
+        try:
+            results[name] = run(rows, stage)
+        except GeounfoldError as error:
+            failures[name] = error
+    if not blocks:
+        raise InputError("no row has a value in the column of the domains")
+    return results, failures, blocks
+
+
+def parts_of_rows(codes: Ints, names: list[str], done: list[str], chosen: Any) -> Ints:
+    """Return the position of each row's domain among those done, (n,); -1 and -2 as PartedTable."""
+    place = np.array([done.index(name) if name in done else -2 for name in [*names]] + [-2])
+    return np.where(chosen, place[codes], -1)
+
+
+def _result_row(name: str, u: Unfolding) -> dict[str, Any]:
+    return {
+        "domain": name,
+        "blocks": len(u.folded),
+        "outcome": "proved" if u.injective else "not proved",
+        "trust": None if u.trust is None else u.trust.word,
+        "nmd_mean": u.quality.nmd.mean,
+        "volume_folded": u.quality.volume_folded,
+        "volume_unfolded": u.quality.volume_unfolded,
+        "outside_share": u.outside_share,
+        "torn": u.torn,
+        "seconds": sum(u.seconds.values()),
+        "error": "",
+    }
+
+
+def _failure_row(name: str, blocks: int, error: GeounfoldError) -> dict[str, Any]:
+    empty = dict.fromkeys(
+        (
+            "trust",
+            "nmd_mean",
+            "volume_folded",
+            "volume_unfolded",
+            "outside_share",
+            "torn",
+            "seconds",
+        )
+    )
+    return {"domain": name, "blocks": blocks, "outcome": "failed", **empty, "error": str(error)}

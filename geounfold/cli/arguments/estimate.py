@@ -57,7 +57,7 @@ def add_estimate(commands: Any) -> Parser:
     group.add("--grade", metavar="NAME", required=True, help="column of SAMPLES to estimate")
     group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
     add_samples_choice(group)
-    add_grade_values(group, rare=False)
+    add_grade_values(group)
     add_domain(group)
     add_columns(group)
     group = parser.section("outputs")

@@ -31,7 +31,7 @@ def add_columns(section: Section) -> None:
     section.add(
         "--columns",
         metavar="A,B,C",
-        help="columns of the coordinates, if their names are unusual",
+        help="columns of the coordinates, if of unusual names",
     )
     add_where(section, "where", "rows to take, such as ROCK=ORE; others stay empty", rare=False)
     add_element(section, "element", "POINTS")
@@ -202,7 +202,7 @@ _METHOD = (
     ),
     ("datum", "D", False, "flat surface: mid (default), top, bottom or proportional: both"),
     ("up", "X,Y,Z", False, "direction of the top (hanging wall) (default 0,0,1)"),
-    ("body", "N", False, "which of several separate bodies, 0 the largest, or all"),
+    ("body", "N", False, "which of several bodies: 0 the largest, 1, ... or all"),
     ("parts", "P", False, "sheets of a branched body: auto (default) or one"),
     ("flattener", "F", True, "spring (default) or another; `geounfold compare` tries all"),
     (

@@ -1,55 +1,60 @@
-"""Ends of cut-offs: marks of the slip along a fault, if they are the ore's own outline."""
+"""Outlines: where the rim of a fault block meets a fault, which marks the slip along it.
+
+The rim of the hull near the end of a cut-off is carried into the block's own flat plane. There its
+place along the cut-off is fitted against the distance from it and read off at the cut-off itself.
+The end of the cut-off alone would be off by the blocks' staircase.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from geounfold.body.fault_surface import FaultSurface
 from geounfold.faults.block_map import BlockMap
-from geounfold.faults.cutoffs import Cutoff
+from geounfold.faults.cutoffs import MIDDLE, Cutoff
 from geounfold.faults.joints import Joint
 from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Floats
 
 _JUNCTION = 2.5  # blocks from another fault within which an end is a junction of faults
-_LIMIT = 7.0  # blocks around an end whose outline is compared on both sides
-_PLANE = 0.5  # blocks off one plane up to which both outlines are a limit of the model
+_AROUND = 8.0  # blocks around an end whose rim is used
+_FEWEST = 12  # faces of the hull that a rim must have there
+_STEEPEST = 2.5  # blocks along the cut-off per block off it, above which a rim runs along it
+_ROUGHEST = 0.8  # blocks: root mean square that a straight rim may leave
+_PLANE = 0.5  # blocks off one plane up to which both rims may be a limit of the model
 _HORIZON = 0.75  # cosine with the layers' normal from which a face of the hull is top or bottom
+AGREE = 2.5
+"""Blocks by which the slips along a fault that its two ends mark may differ."""
 
-End = tuple[Floats, Floats]
-"""Place of a cut-off's end in the joint flat space, (2,), and in the folded space, (3,)."""
 
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """One end of a fault between two blocks, where the outline of both meets it.
 
-def ends(cut: Cutoff, placed: Floats, axis: Floats) -> list[End | None]:
-    """Return the two ends of a cut-off along a direction of the flat plane, from its middle levels.
-
-    Parameters
+    Attributes
     ----------
-    cut : Cutoff
-        The cut-off.
-    placed : (n, 3) float
-        Its samples in the joint flat space.
-    axis : (2,) float
-        The direction.
+    flaw : str
+        Why it marks no slip: ``junction``, ``no rim``; empty if it marks it.
+    plane : bool
+        Whether both rims lie in one plane, as at a limit of the model.
+    foot, hanging : (3,) float
+        Places of the outline in the own flat space of each block.
     """
-    out: list[End | None] = []
-    for sign in (-1, 1):
-        flat, folded = [], []
-        for level in (1, 2, 3):
-            rows = cut.rows(level)
-            if len(rows) < 3:
-                continue
-            last = rows[(sign * (placed[rows, :2] @ axis)).argmax()]
-            flat.append(placed[last, :2])
-            folded.append(cut.folded[last])
-        out.append((np.mean(flat, axis=0), np.mean(folded, axis=0)) if flat else None)
-    return out
+
+    flaw: str
+    plane: bool
+    foot: Floats
+    hanging: Floats
+
+
+_NOWHERE = np.full(3, np.nan)
 
 
 class Outlines:
-    """The outline of every fault block, and which ends of cut-offs lie on it.
+    """The rim of every fault block.
 
     Parameters
     ----------
@@ -61,56 +66,95 @@ class Outlines:
 
     def __init__(self, blocks: Sequence[BlockMap], surfaces: Sequence[FaultSurface]) -> None:
         self._blocks, self._surfaces = blocks, surfaces
-        self._rims: dict[int, tuple[Floats, Floats]] = {}
-        self._known: dict[tuple[int, ...], str] = {}
+        self._rims: dict[int, tuple[Floats, Floats, Floats]] = {}
 
-    def flaw(self, number: int, joint: Joint, foot: Floats, hanging: Floats) -> str:
-        """Return why a pair of ends marks no slip: junction or model limit; empty if it does.
+    def marks(self, joint: Joint, strike: Floats) -> list[Mark]:
+        """Return what the two ends of a joint mark.
 
         Parameters
         ----------
-        number : int
-            Of the joint.
         joint : Joint
             The joint.
-        foot, hanging : (3,) float
-            The ends, folded.
+        strike : (3,) float
+            The fault's mean strike, folded.
         """
-        key = (number, *np.rint(np.concatenate([foot, hanging]) / 2).astype(int).tolist())
-        if key not in self._known:
-            self._known[key] = self._flaw(joint, foot, hanging)
-        return self._known[key]
+        return [self._mark(joint, sign * strike) for sign in (-1.0, 1.0)]
 
-    def _flaw(self, joint: Joint, foot: Floats, hanging: Floats) -> str:
-        both = np.stack([foot, hanging])
+    def _mark(self, joint: Joint, outward: Floats) -> Mark:
+        """Return what the end of a joint towards a folded direction (3,) marks."""
+        ends, places, rims = [], [], []
+        for number, cut in ((joint.foot, joint.low), (joint.hanging, joint.high)):
+            rows = cut.rows(MIDDLE)
+            if len(rows) < 6:
+                return Mark("no rim", False, _NOWHERE, _NOWHERE)
+            last = rows[(cut.folded[rows] @ outward).argmax()]
+            C, N, flat = self._rim(number)
+            near = np.linalg.norm(C - cut.folded[last], axis=1) < _AROUND
+            ends.append(cut.folded[last])
+            rims.append((C[near], N[near]))
+            places.append(self._crossing(number, cut, int(last), flat[near]))
+        both = np.stack(ends)
         for k, surface in enumerate(self._surfaces):
             if k != joint.fault and surface.sides(both).distance.min() < _JUNCTION:
-                return "junction"
-        near = []
-        for block, end in ((joint.foot, foot), (joint.hanging, hanging)):
-            C, N = self._rim(block)
-            close = np.linalg.norm(C - end, axis=1) < _LIMIT
-            near.append((C[close], N[close]))
-        if min(len(C) for C, _ in near) < 8:
-            return ""
-        P = np.concatenate([C for C, _ in near])
-        middle = P.mean(axis=0)
-        n = np.linalg.svd(P - middle, full_matrices=False)[2][2]
-        off = max(float(np.abs((C - middle) @ n).mean()) for C, _ in near)
-        along = min(float(np.abs(N @ n).mean()) for _, N in near)
-        return "model limit" if off < _PLANE and along > 0.7 else ""
+                return Mark("junction", False, _NOWHERE, _NOWHERE)
+        foot, hanging = places
+        if foot is None or hanging is None:
+            return Mark("no rim", False, _NOWHERE, _NOWHERE)
+        return Mark("", _coplanar(rims), foot, hanging)
 
-    def _rim(self, block: int) -> tuple[Floats, Floats]:
-        """Return centres and normals of a block's hull at neither top, bottom nor a fault."""
+    def _crossing(self, number: int, cut: Cutoff, last: int, rim: Floats) -> Floats | None:
+        """Return where a rim (n, 3), flat, meets a cut-off near its sample ``last``; or None."""
+        end, rows = cut.flat[last], cut.rows(MIDDLE)
+        if len(rim) < _FEWEST:
+            return None
+        apart = cut.flat[rows, :2] - end[:2]
+        apart = apart[np.linalg.norm(apart, axis=1) < _AROUND]
+        t = np.linalg.svd(apart - apart.mean(axis=0), full_matrices=False)[2][0]
+        t = t * (-1.0 if apart.mean(axis=0) @ t > 0 else 1.0)  # towards the end
+        n = np.array([-t[1], t[0]])
+        line = end[:2] + apart.mean(axis=0)
+        layers = self._blocks[number].carry(self._blocks[number].points[::17])
+        middle = layers.flat[layers.there, :2].mean(axis=0)
+        n = n * (1.0 if (middle - line) @ n > 0 else -1.0)
+        along, off = (rim[:, :2] - line) @ t, (rim[:, :2] - line) @ n
+        z = rim[:, 2] - end[2]
+        weight = np.clip(1 - np.abs(off / _AROUND) ** 3, 0, None) ** 3 * (off > -1.0)
+        rows_ = np.stack([np.ones(len(rim)), off, z], axis=1)
+        fit, left = np.zeros(3), np.zeros(len(rim))
+        for _ in range(4):
+            w = weight / (1 + (left / 0.5) ** 2)
+            N = (rows_ * w[:, None]).T @ rows_ + np.diag([1e-9, 1e-3, 1e-3])
+            fit = np.linalg.solve(N, rows_.T @ (w * along))
+            left = along - rows_ @ fit
+        if (weight > 0.1).sum() < _FEWEST or abs(fit[1]) > _STEEPEST:
+            return None
+        if np.sqrt((weight * left**2).sum() / weight.sum()) > _ROUGHEST:
+            return None
+        return np.array([*(line + fit[0] * t), end[2]])
+
+    def _rim(self, block: int) -> tuple[Floats, Floats, Floats]:
+        """Return centres, normals and flat places of a hull at neither top, bottom nor a fault."""
         if block not in self._rims:
             own = self._blocks[block]
             mesh = own.fit.split.mesh
             C, N = mesh.V[mesh.F].mean(axis=1), face_normals(mesh.V, mesh.F)
+            keep = np.ones(len(C), dtype=bool)
+            for surface in self._surfaces:
+                keep &= surface.sides(C).distance > 1.3
+            C, N = C[keep], N[keep]
             layers = own.carry(C, gradients=True)
             up = layers.gradient[:, 2]
             up = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12)
-            keep = ~(np.abs((up * N).sum(axis=1)) > _HORIZON)
-            for surface in self._surfaces:
-                keep &= surface.sides(C).distance > 1.3
-            self._rims[block] = C[keep], N[keep]
+            rim = np.abs((up * N).sum(axis=1)) <= _HORIZON
+            self._rims[block] = C[rim], N[rim], layers.flat[rim]
         return self._rims[block]
+
+
+def _coplanar(rims: Sequence[tuple[Floats, Floats]]) -> bool:
+    """Return whether two rims, centres and normals (n, 3), lie in one plane."""
+    P = np.concatenate([C for C, _ in rims])
+    middle = P.mean(axis=0)
+    n = np.linalg.svd(P - middle, full_matrices=False)[2][2]
+    off = max(float(np.abs((C - middle) @ n).mean()) for C, _ in rims)
+    along = min(float(np.abs(N @ n).mean()) for _, N in rims)
+    return off < _PLANE and along > 0.7

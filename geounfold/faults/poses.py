@@ -9,7 +9,7 @@ looks the same way from both blocks, and one that layer-parallel shear is the sa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,7 @@ from geounfold.faults.block_map import BlockMap, Pose
 from geounfold.faults.cutoffs import LEVELS, MIDDLE, Cutoff, strike_of
 from geounfold.faults.equations import WIDTH, Equations
 from geounfold.faults.joints import Joint
-from geounfold.faults.outline import Outlines, ends
+from geounfold.faults.outline import AGREE, Mark, Outlines
 from geounfold.geometry.mesh import Floats, Ints
 
 
@@ -33,8 +33,8 @@ class PoseRules:
         Error of a cut-off across its direction, per ``along`` blocks of its length.
     along : float
         Blocks of cut-off that count as one observation.
-    corner : float
-        Error of the place of an outline's end along the fault.
+    corner, single : float
+        Error of the slip along the fault that an outline's two ends mark, and one end alone.
     rake : float
         Slip across the expected direction, as a share of the slip.
     turn : float
@@ -48,6 +48,7 @@ class PoseRules:
     normal: float = 0.35
     along: float = 6.0
     corner: float = 0.7
+    single: float = 1.0
     rake: float = 0.2
     turn: float = 0.03
     shear: float = 0.25
@@ -77,10 +78,12 @@ class JointView:
         Whether the slip's direction was given.
     welds : list of (k, 3) float
         Places that no fault parts, in the own flat space of each block.
-    corners : list of str
-        What became of the two pairs of ends; empty texts are used ones.
+    marks : list of Mark
+        Where the outlines of both blocks meet the fault; empty if the model was cut off.
     used : int
-        Number of pairs of ends used.
+        Number of marks used in the last round.
+    agree : bool
+        Whether the marks agreed in the last round.
     """
 
     joint: Joint
@@ -91,8 +94,9 @@ class JointView:
     slip: float
     given: bool
     welds: list[Floats]
-    corners: list[str] = field(default_factory=list)
+    marks: list[Mark]
     used: int = 0
+    agree: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +122,11 @@ class PoseFit:
 
 
 def view(
-    joint: Joint, blocks: Sequence[BlockMap], up: Floats, direction: Floats | None
+    joint: Joint,
+    blocks: Sequence[BlockMap],
+    up: Floats,
+    direction: Floats | None,
+    outlines: Outlines | None,
 ) -> JointView:
     """Return what the fit needs of a joint.
 
@@ -132,6 +140,8 @@ def view(
         Working units.
     direction : (3,) float or None
         Direction of the fault's slip, if it is known.
+    outlines : Outlines or None
+        The ore's outline; None if the model was cut off.
     """
     ends_ = ((joint.foot, joint.low), (joint.hanging, joint.high))
     strike = strike_of(joint.surface, joint.low.folded[::5], up)
@@ -144,7 +154,8 @@ def view(
         both = carried[0].there & carried[1].there
         welds = [c.flat[both] for c in carried]
     heads, leans = [look[0] for look in looks], [look[1] for look in looks]
-    return JointView(joint, trees, heads, leans, pairs, slip, direction is not None, welds)
+    marks = [] if outlines is None else outlines.marks(joint, strike)
+    return JointView(joint, trees, heads, leans, pairs, slip, direction is not None, welds, marks)
 
 
 def _tree(cut: Cutoff, level: int) -> tuple[cKDTree, Ints] | None:
@@ -219,7 +230,6 @@ def solve_poses(
     views: list[JointView],
     poses: list[Pose],
     groups: Sequence[int],
-    outlines: Outlines | None,
     rules: PoseRules | None = None,
 ) -> PoseFit:
     """Return the poses that join all fault blocks.
@@ -234,8 +244,6 @@ def solve_poses(
         First guess.
     groups : sequence of int
         First block of each block's group.
-    outlines : Outlines or None
-        Which ends of cut-offs are the ore's outline; None if the model was cut off.
     rules : PoseRules, optional
         Weights.
     """
@@ -245,8 +253,8 @@ def solve_poses(
     done = 0
     for done in range(1, rules.rounds + 1):
         equations = Equations(len(blocks))
-        for number, v in enumerate(views):
-            _add_joint(equations, v, poses, rules, number, outlines if done > 5 else None)
+        for v in views:
+            _add_joint(equations, v, poses, rules, late=done > 5)
         equations.hold(poses, groups, share, rules.shear)
         step = equations.steps()
         damping = min(1.0, 0.3 / max(float(np.abs(step[:, 0]).max()), 1e-12))
@@ -301,10 +309,10 @@ def _add_joint(
     v: JointView,
     poses: Sequence[Pose],
     rules: PoseRules,
-    number: int,
-    outlines: Outlines | None,
+    *,
+    late: bool,
 ) -> None:
-    """Add a joint's rows."""
+    """Add a joint's rows; its outline's only in late rounds, once the blocks lie side by side."""
     j = v.joint
     low = _Wall(j.foot, poses[j.foot], j.low, v.trees[0])
     high = _Wall(j.hanging, poses[j.hanging], j.high, v.trees[1])
@@ -315,10 +323,9 @@ def _add_joint(
     mid = np.concatenate([w.along[w.cut.rows(MIDDLE)] for w in (low, high)])
     if len(mid):
         axis = np.linalg.eigh(mid.T @ mid)[1][:, 1]
-        v.used, v.corners = 0, []
-        if outlines is not None and not v.welds:
-            marks = _marks(v, low, high, axis, number, outlines)
-            _add_corners(equations, rules, marks, low, high, axis)
+        v.used, v.agree = 0, True
+        if late and v.marks and not v.welds:
+            _add_corners(equations, v, rules, low, high, axis)
         _add_expected(equations, v, rules, low, high, axis)
     if not v.welds:
         _add_turn(equations, v, rules, low, high)
@@ -361,41 +368,24 @@ def _add_lines(equations: Equations, rules: PoseRules, moved: _Wall, against: _W
         )
 
 
-def _marks(
-    v: JointView, low: _Wall, high: _Wall, axis: Floats, number: int, outlines: Outlines
-) -> list[tuple[Floats, Floats]]:
-    """Return the pairs of ends (2,) that mark the slip along the fault, if they agree."""
-    found = []
-    for a, b in zip(
-        ends(low.cut, low.placed, axis), ends(high.cut, high.placed, axis), strict=True
-    ):
-        if a is not None and b is not None:
-            flaw = outlines.flaw(number, v.joint, a[1], b[1])
-            found.append((flaw, a[0], b[0], float((b[0] - a[0]) @ axis)))
-    good = [f for f in found if not f[0]]
-    v.corners = [f[0] for f in found]
-    if len(good) == 2 and abs(good[0][3] - good[1][3]) > _AGREE:
-        v.corners, good = ["disagree", "disagree"], []
-    v.used = len(good)
-    return [(a, b) for _, a, b, _ in good]
-
-
 def _add_corners(
-    equations: Equations,
-    rules: PoseRules,
-    marks: Sequence[tuple[Floats, Floats]],
-    low: _Wall,
-    high: _Wall,
-    axis: Floats,
+    equations: Equations, v: JointView, rules: PoseRules, low: _Wall, high: _Wall, axis: Floats
 ) -> None:
-    """Add rows that bring the ends of cut-offs together along the fault."""
-    sd = rules.corner if len(marks) == 2 else 1.0
-    for a, b in marks:
-        below, above = (
-            wall.pose.unplace(np.append(end, 0.0)[None]) for wall, end in ((low, a), (high, b))
+    """Add rows that bring the outlines of both blocks together along the fault, if they agree."""
+    used = [m for m in v.marks if not m.flaw]
+    below = [low.pose.place(m.foot[None])[0, :2] for m in used]
+    above = [high.pose.place(m.hanging[None])[0, :2] for m in used]
+    off = [float((b - a) @ axis) for a, b in zip(below, above, strict=True)]
+    if len(off) == 2 and abs(off[0] - off[1]) > AGREE:
+        used, v.agree = [], False
+    sd = rules.corner if len(used) == 2 else rules.single
+    for m, o in zip(used, off, strict=False):
+        equations.add(
+            high.moves(m.hanging[None], axis),
+            low.moves(m.foot[None], axis),
+            *(np.array([o]), np.array([sd**-2])),
         )
-        off, weight = np.array([(b - a) @ axis]), np.array([sd**-2])
-        equations.add(high.moves(above, axis), low.moves(below, axis), off, weight)
+    v.used = len(used)
 
 
 def _add_expected(

@@ -135,9 +135,12 @@ class Faulting:
         ]
         joints = self._joints(blocks, up)
         blocks, joints, poses, groups = first_poses(blocks, joints, up)
-        views = [view(j, blocks, up, self.given.direction(j.surface.name, frame)) for j in joints]
         outlines = Outlines(blocks, self.surfaces) if self.given.outline == "ore" else None
-        found = solve_poses(blocks, views, poses, groups, outlines)
+        views = [
+            view(j, blocks, up, self.given.direction(j.surface.name, frame), outlines)
+            for j in joints
+        ]
+        found = solve_poses(blocks, views, poses, groups)
         poses = _groups_apart(blocks, found.poses, groups)
         self._tell_groups(groups)
         faults = [

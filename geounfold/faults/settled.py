@@ -22,7 +22,7 @@ def settled_by(v: JointView, poses: Sequence[Pose], rules: PoseRules) -> str:
         return "weld"
     if v.given:
         return "given"
-    if v.used == 2:
+    if v.used == 2 and not all(m.plane for m in v.marks):
         return "outline"
     return "shape" if shape_sd(v, poses, rules) <= _SHAPE else "prior"
 

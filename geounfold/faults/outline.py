@@ -20,7 +20,8 @@ from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Floats
 
 _JUNCTION = 2.5  # blocks from another fault within which an end is a junction of faults
-_AROUND = 8.0  # blocks around an end whose rim is used
+_AROUND = 6.5  # blocks around an end whose rim is used
+_AT_FAULT = 1.3  # blocks from a fault within which a face of the hull may be its wall
 _FEWEST = 12  # faces of the hull that a rim must have there
 _STEEPEST = 2.5  # blocks along the cut-off per block off it, above which a rim runs along it
 _ROUGHEST = 0.8  # blocks: root mean square that a straight rim may leave
@@ -140,7 +141,7 @@ class Outlines:
             C, N = mesh.V[mesh.F].mean(axis=1), face_normals(mesh.V, mesh.F)
             keep = np.ones(len(C), dtype=bool)
             for surface in self._surfaces:
-                keep &= surface.sides(C).distance > 1.3
+                keep &= surface.sides(C).distance > _AT_FAULT
             C, N = C[keep], N[keep]
             layers = own.carry(C, gradients=True)
             up = layers.gradient[:, 2]

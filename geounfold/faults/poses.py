@@ -37,6 +37,8 @@ class PoseRules:
         Error of the slip along the fault that an outline's two ends mark, and one end alone.
     rake : float
         Slip across the expected direction, as a share of the slip.
+    expected : float
+        Error of the cut-offs' places that is added to it.
     turn : float
         Turn of a block in the plane of its layers, radians.
     shear : float
@@ -50,6 +52,7 @@ class PoseRules:
     corner: float = 0.7
     single: float = 1.0
     rake: float = 0.2
+    expected: float = 0.5
     turn: float = 0.03
     shear: float = 0.25
     rounds: int = 250
@@ -395,11 +398,11 @@ def _add_expected(
     if not len(v.pairs):
         return
     c, q = v.pairs.T
-    sd = rules.rake * v.slip + (0.3 if v.given else 1.0)
-    if v.used:  # the outline knows better
-        sd = 30.0 if v.used == 2 else max(2 * sd, 6.0)
+    sd = rules.rake * v.slip + (0.3 if v.given else rules.expected)
+    if v.used and not v.given and not all(m.plane for m in v.marks if not m.flaw):
+        sd = 30.0 if v.used == 2 else max(2 * sd, 6.0)  # the outline knows better
     off = (high.placed[c, :2] - low.placed[q, :2]) @ axis
-    weight = np.full(len(c), 1 / (len(c) * sd**2))
+    weight = 1 / (len(c) * sd**2 * np.sqrt(1 + (off / sd) ** 2))
     equations.add(high.moves(high.cut.flat[c], axis), low.moves(low.cut.flat[q], axis), off, weight)
 
 

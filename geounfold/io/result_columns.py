@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from geounfold.geometry.mesh import Floats
+from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.coordinate_columns import coordinate_columns, numbers
 from geounfold.io.packages.names import Triple
 
@@ -17,21 +17,25 @@ if TYPE_CHECKING:
 
 UNFOLDED: Triple = ("unfolded_x", "unfolded_y", "unfolded_z")
 FOLDED: Triple = ("folded_x", "folded_y", "folded_z")
+FAULT_BLOCK = "fault_block"
 WORLD: Triple = ("world_x", "world_y", "world_z")
 
 
 def result_columns(names: Triple, carried: Carried) -> dict[str, Any]:
     """Return the result for carried points by output column, (n,) each.
 
-    A result in the folded space has no ``stratigraphic``.
+    A result in the folded space has no ``stratigraphic``; ``fault_block`` is there if faults were
+    taken out.
     """
     points = {name: carried.points[:, axis] for axis, name in enumerate(names)}
     height = {} if names == FOLDED else {"stratigraphic": carried.stratigraphic}
+    block = getattr(carried, "block", None)
     return {
         **points,
         **height,
         "location": carried.location,
         "mesh_distance": carried.distance,
+        **({} if block is None else {FAULT_BLOCK: block}),
     }
 
 
@@ -64,3 +68,14 @@ def with_carried(
     """
     points = frame_points(frame, UNFOLDED if names == FOLDED else None)
     return frame.assign(**result_columns(names, carry(points)))
+
+
+def given_blocks(frame: pd.DataFrame, *, inverse: bool) -> Ints | None:
+    """Return the fault block of flat points that a table names; None if it names none.
+
+    Folded points need none: the faults part them.
+    """
+    if not inverse or FAULT_BLOCK not in frame.columns:
+        return None
+    values = pd.to_numeric(frame[FAULT_BLOCK], errors="coerce").fillna(-1).to_numpy(np.float64)
+    return values.astype(np.int64)

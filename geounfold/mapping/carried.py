@@ -34,6 +34,8 @@ class Carried:
         ``len(control.folded.T)`` on are those of the shell.
     distance : (n,) float
         Distance from the control mesh, in the points' space and unit; 0 inside.
+    block : (n,) int or None
+        Fault block whose mesh carried each point, -1 if there is no image; None without faults.
     unsolved : int
         Number of points in a prism for which Newton's method found no image; they are not
         placed. Always 0 with the coordinates of tetrahedra.
@@ -46,6 +48,7 @@ class Carried:
     element: Ints
     distance: Floats
     unsolved: int = 0
+    block: Ints | None = None
 
     @property
     def location(self) -> np.ndarray:
@@ -65,7 +68,10 @@ class Carried:
             element=np.full(len(rows), -1, dtype=np.int64),
             distance=np.full(len(rows), np.nan),
             unsolved=self.unsolved,
+            block=None if self.block is None else np.full(len(rows), -1),
         )
+        if out.block is not None and self.block is not None:
+            out.block[rows] = self.block
         for name in ("points", "stratigraphic", "inside", "placed", "element", "distance"):
             getattr(out, name)[rows] = getattr(self, name)
         return out
@@ -79,7 +85,10 @@ class Carried:
             inside=self.inside.copy(),
             placed=self.placed.copy(),
             element=self.element.copy(),
+            block=None if self.block is None else self.block.copy(),
         )
+        if out.block is not None:
+            out.block[rows] = -1
         out.points[rows] = out.stratigraphic[rows] = np.nan
         out.inside[rows] = out.placed[rows] = False
         out.element[rows] = -1
@@ -94,6 +103,7 @@ class Carried:
             self.placed[rows],
             self.element[rows],
             self.distance[rows],
+            block=None if self.block is None else self.block[rows],
         )
 
 

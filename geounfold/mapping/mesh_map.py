@@ -109,6 +109,11 @@ class UnfoldingMap:
             return JoinedSpace(spaces, self.whole.folded, self.parts.cells)
         return MeshSpace(self.control.unfolded, shell, self.reach, self._known)
 
+    @property
+    def faulted(self) -> bool:
+        """Whether the parts are fault blocks in one flat space."""
+        return self.parts is not None and isinstance(self.parts.cells, FaultCells)
+
     @cached_property
     def whole(self) -> ControlMesh:
         """The control mesh and its shell as one."""
@@ -187,9 +192,17 @@ class UnfoldingMap:
         empty = missed[~out.placed[missed]]
         out.points[empty] = np.nan
         out.stratigraphic[empty] = np.nan
+        out = replace(out, block=self._blocks_of(out.element))
         if self.prisms is None:
             return out
         return replace(out, unsolved=self._by_prisms(self.prisms, P, out, inverse=inverse))
+
+    def _blocks_of(self, element: Ints) -> Ints | None:
+        """Return the fault block of each element (n,), -1 for none; None without faults."""
+        if self.parts is None or not self.faulted:
+            return None
+        first = self.whole.folded.T[np.maximum(element, 0), 0]
+        return np.where(element >= 0, self.parts.vertex[first], -1)
 
     def _by_prisms(
         self, prisms: PrismInterpolant, points: Floats, carried: Carried, *, inverse: bool
@@ -243,6 +256,7 @@ class UnfoldingMap:
         if fault_block is None:
             return self.carry(points, inverse=inverse)
         block = np.asarray(fault_block, dtype=np.int64)
+        P = np.asarray(points, dtype=np.float64)
         if block.shape != (len(points),):
             raise InputError(
                 f"fault_block must have one number per point, ({len(points)},), but has "
@@ -255,16 +269,18 @@ class UnfoldingMap:
             )
         out = self.carry(points, inverse=inverse)
         for k in range(most + 1):
-            rows = np.flatnonzero(block == k)
+            rows = np.flatnonzero((block == k) & np.isfinite(P).all(axis=1))
             if not len(rows):
                 continue
             own, elements = self._of_part(k)
-            found = own.carry(points[rows], inverse=inverse)
+            found = own.carry(P[rows], inverse=inverse)
             for name in ("points", "stratigraphic", "inside", "placed", "distance"):
                 getattr(out, name)[rows] = getattr(found, name)
             out.element[rows] = np.where(
                 found.element >= 0, elements[np.maximum(found.element, 0)], -1
             )
+            if out.block is not None:
+                out.block[rows] = np.where(found.placed, k, -1)
         return out
 
     def _of_part(self, part: int) -> tuple[UnfoldingMap, Ints]:

@@ -28,6 +28,7 @@ from geounfold.io.packages.names import Triple
 from geounfold.io.result_columns import (
     FOLDED,
     UNFOLDED,
+    given_blocks,
     result_columns,
     with_carried,
     world_columns,
@@ -243,7 +244,9 @@ def _carry_part(
     if (np.abs(points) > LARGEST_COORDINATE).any():
         raise InputError(f"{part.path}: a coordinate is beyond {LARGEST_COORDINATE:g}")
     names = FOLDED if how.inverse else UNFOLDED
-    results = result_columns(names, mapping.carry(points, inverse=how.inverse))
+    blocks = given_blocks(frame, inverse=how.inverse)
+    blocks = blocks if mapping.faulted else None
+    results = result_columns(names, mapping.carry_by_block(points, blocks, inverse=how.inverse))
     if how.place is not None:
         results = world_columns(points) | results
     target = Path(out)

@@ -184,8 +184,6 @@ class Unfolding:
         if given is None:
             given = pd.DataFrame(self.folded, columns=["x", "y", "z"])
         parts = {"body_part": self.body_part} if self.junctions else {}
-        if self._record.faulted is not None:
-            parts["fault_block"] = self.fault_block
         found = {**result_columns(UNFOLDED, self.carried), **self.columns, **parts}
         if self.chosen is not None:
             rows = np.flatnonzero(self.chosen)

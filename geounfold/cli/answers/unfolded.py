@@ -99,6 +99,10 @@ class UnfoldedBody:
 
             saved = cast("UnfoldingMap", self._result.map)  # the method has one: checked before
             write_control(parts["--mesh"], saved, self._result.certificate)
+        if "--slips" in parts:
+            from geounfold.io.tables.files import write_table
+
+            write_table(parts["--slips"], self._result.slips)
         if "--summary" in parts:
             write_json(parts["--summary"], self.summary)
         if "--report" in parts:

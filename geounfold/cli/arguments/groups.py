@@ -186,7 +186,7 @@ def add_method(section: Section) -> None:
         "--config",
         metavar="C.toml",
         default=argparse.SUPPRESS,
-        help="file of options, see `geounfold init`; those given here override it",
+        help="file of options; those given here override it",
     )
     for name, metavar, rare, help_text in _METHOD:
         section.add(
@@ -200,9 +200,9 @@ _METHOD = (
         "how the map is made: sheet (default), thesis, ufo, stratigraphic, shear, volumetric or "
         "isomap",
     ),
-    ("datum", "D", False, "flat surface: mid (default), top, bottom or proportional: both"),
+    ("datum", "D", False, "flat surface: mid (default), top, bottom, proportional"),
     ("up", "X,Y,Z", False, "direction of the top (hanging wall) (default 0,0,1)"),
-    ("body", "N", False, "which of several bodies: 0 the largest, 1, ... or all"),
+    ("body", "N", False, "one of several bodies, 0 the largest, or all"),
     ("parts", "P", False, "sheets of a branched body: auto (default) or one"),
     ("flattener", "F", True, "spring (default) or another; `geounfold compare` tries all"),
     (

@@ -14,7 +14,7 @@ from geounfold.cli.arguments.groups import (
     add_method,
     add_samples_choice,
 )
-from geounfold.cli.arguments.help import Parser
+from geounfold.cli.arguments.help import Parser, Section
 from geounfold.cli.arguments.texts import (
     ANGLES,
     FORMATS,
@@ -33,6 +33,8 @@ _DISTORTION = """\
                    leaves the block out; else empty
   body_part        if a body has several sheets, or with --part-column: sheet
                    of each block, 0 the largest; -1 outside the bodies
+  fault_block      with --faults or --fault-blocks: block between faults, 0
+                   the largest; flat points are carried back by it
   block_volume, unfolded_volume
                    if the blocks' sides are known: from --sizes, or from
                    columns called XINC, dx, size_x or alike"""
@@ -68,6 +70,7 @@ def add_unfold(commands: Any) -> Parser:
         help="sides of a block, for volumes: columns or lengths",
     )
     add_block_size(group, rare=True)
+    _add_faults(group)
     group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
     group.add("--bottom", metavar="B", help="the bottom surface")
     add_frame(group, "POINTS")
@@ -101,6 +104,25 @@ def add_unfold(commands: Any) -> Parser:
     return parser
 
 
+def _add_faults(group: Section) -> None:
+    """Add the arguments for faults."""
+    group.add("--faults", nargs="+", metavar="F", help="surfaces of the faults that cut the body")
+    group.add("--fault-blocks", metavar="COLUMN", help="column of the fault block of each block")
+    group.add(
+        "--slip-direction",
+        nargs="+",
+        metavar="NAME=TREND/PLUNGE",
+        rare=True,
+        help="direction of slip along a fault, in degrees; without NAME= along all",
+    )
+    group.add(
+        "--outline",
+        metavar="O",
+        rare=True,
+        help="ore (default): rims mark the slip along faults; model: the block model was cut off",
+    )
+
+
 def _add_outputs(parser: Parser) -> None:
     """Add the arguments for what is written."""
     group = parser.section("outputs")
@@ -108,6 +130,12 @@ def _add_outputs(parser: Parser) -> None:
     group.add("--summary", metavar="S.json", help="options, figures, proof, warnings, seconds")
     group.add("--map", metavar="M.npz", help="the map, for `geounfold map`")
     group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
+    group.add(
+        "--slips",
+        metavar="S.csv",
+        rare=True,
+        help="a row per slip vector: places on both walls of a fault, throw, heave, strike slip",
+    )
     group.add(
         "--mesh", metavar="C.vtu", rare=True, help="the control mesh in both spaces, flaws marked"
     )

@@ -21,7 +21,13 @@ from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError, OutputError
 from geounfold.io import Outputs, holds_surface, write_surface
 from geounfold.io.paths import ending, existing_file
-from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, world_columns
+from geounfold.io.result_columns import (
+    FOLDED,
+    UNFOLDED,
+    given_blocks,
+    result_columns,
+    world_columns,
+)
 from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables.parted import PartedTable
 
@@ -163,9 +169,13 @@ class _Carrying:
         self.counts: Counter[str] = Counter()
         self._unsolved = 0
 
-    def columns(self, _: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
+    def columns(self, frame: pd.DataFrame, points: Floats, __: slice) -> dict[str, Any]:
         """Return the output columns of a batch of points."""
-        carried = self._saved.carry(points, inverse=self._inverse)
+        blocks = given_blocks(frame, inverse=self._inverse)
+        if blocks is not None and getattr(self._saved, "faulted", False):
+            carried = self._saved.carry_by_block(points, blocks, inverse=True)
+        else:
+            carried = self._saved.carry(points, inverse=self._inverse)
         found = result_columns(FOLDED if self._inverse else UNFOLDED, carried)
         self.counts.update(place_counts(found))
         self._unsolved += carried.unsolved if self._inverse else 0

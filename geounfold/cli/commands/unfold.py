@@ -10,6 +10,7 @@ from geounfold.cli.answers.unfolded import UnfoldedBody
 from geounfold.cli.domains.unfold import check_by, unfold_by
 from geounfold.cli.inputs.body import read_body
 from geounfold.cli.inputs.drillholes import check_hole_options
+from geounfold.cli.inputs.faults import check_fault_options
 from geounfold.cli.inputs.grades import check_grade_options, exploration
 from geounfold.cli.inputs.points import files_given
 from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
@@ -28,6 +29,7 @@ def run(args: Namespace, console: Console) -> None:
     check_hole_options(args)
     check_grade_options(args)
     check_by(args)
+    check_fault_options(args)
     outputs = _outputs(args, console)
     if args.report is not None:
         _check_rendering(console)
@@ -40,7 +42,12 @@ def run(args: Namespace, console: Console) -> None:
     from geounfold.unfolding import run as unfolding
 
     result = unfolding.unfold(
-        body.points, options, progress=console.stage, top=body.top, bottom=body.bottom
+        body.points,
+        options,
+        progress=console.stage,
+        top=body.top,
+        bottom=body.bottom,
+        **body.faults,
     )
     summary = {**result.summary(), "command": command_line(args)}
     if args.crosscheck:
@@ -66,7 +73,8 @@ def run(args: Namespace, console: Console) -> None:
 def _outputs(args: Namespace, console: Console) -> Outputs:
     """Return the checked outputs."""
     inputs = files_given(
-        args.points, args.samples, args.top, args.bottom, config_file(args), *(args.holes or ())
+        *(args.points, args.samples, args.top, args.bottom, config_file(args)),
+        *(*(args.holes or ()), *(args.faults or ())),
     )
     wanted = {
         "--output": (args.output, POINTS_OUT),
@@ -74,6 +82,7 @@ def _outputs(args: Namespace, console: Console) -> Outputs:
         "--map": (args.map, MAP),
         "--mesh": (args.mesh, VTU),
         "--report": (args.report, HTML),
+        "--slips": (args.slips, POINTS_OUT),
         "--samples-out": (args.samples_out, POINTS_OUT),
         "--traces-out": (args.traces_out, TRACES),
     }

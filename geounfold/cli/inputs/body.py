@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from geounfold.cli.inputs.block_sizes import BlockVolumes
 from geounfold.cli.inputs.drillholes import HoleData, read_holes
+from geounfold.cli.inputs.faults import read_faults
 from geounfold.cli.inputs.grades import graded_samples
 from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import open_table, read_samples
@@ -47,6 +48,8 @@ class BodyInputs:
         Given surfaces.
     solid : FilledSolid or None
         The wireframe that the blocks fill.
+    faults : dict
+        What `geounfold.unfold` takes on faults.
     """
 
     table: PointTable | PointStream | PartedTable
@@ -58,6 +61,7 @@ class BodyInputs:
     top: TriMesh | None
     bottom: TriMesh | None
     solid: FilledSolid | None = None
+    faults: dict[str, Any] = field(default_factory=dict)
 
     @property
     def points(self) -> Floats | FilledSolid:
@@ -95,4 +99,5 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
         None if args.top is None else read_surface(args.top),
         None if args.bottom is None else read_surface(args.bottom),
         solid,
+        read_faults(args, table),
     )

@@ -28,13 +28,16 @@ def test_unfold_writes_everything(
         columns: Any,
         *,
         holes: Any,
+        faults: Any,
         exploration: Any,
     ) -> None:
         assert exploration is None  # without --grade
+        assert faults is None  # without --faults
         seen.update(summary=summary, folded=folded, unfolded=unfolded, columns=columns, holes=holes)
         path.write_text("<html>")
 
     kinds = {"CarriedHoles": CarriedHoles, "CarriedPoints": CarriedPoints}
+    kinds["carried_faults"] = lambda result: None
     replace_module(monkeypatch, "report", write_report=write_report, **kinds)
     replace_module(monkeypatch, "report.plots.rendering", check_rendering=lambda: None)
     (tmp_path / "q.csv").write_text("hole;x;y;z\na;1;1;1\n")

@@ -100,6 +100,7 @@ class Format:
 
 
 _GSLIB = (".gslib", ".geoeas", ".dat", ".gs")
+_VTK = (".vtu", ".vtp", ".vti", ".vtk", ".vtr", ".vts")
 _MESHES = (".ply", ".obj", ".stl", ".off")
 
 FORMATS = (
@@ -107,9 +108,9 @@ FORMATS = (
     Format(
         "VTK",
         "vtk",
-        (".vtu", ".vtp", ".vti"),
+        _VTK,
         (".vtu", ".vtp"),
-        (".vtp",),
+        (".vtp", ".vtk"),
         (".vtp",),
         library="pyvista",
     ),

@@ -1,4 +1,4 @@
-"""VTK's XML files through pyvista: points, block models and triangles.
+"""VTK's XML and legacy files through pyvista: points, block models and triangles.
 
 Floats are written and read as float64, bit for bit. Unit and coordinate reference are field data
 called ``unit`` and ``crs``, because VTK has no entry for them.
@@ -28,7 +28,7 @@ def read_points(path: Path) -> Points:
     """Return the centres of a file's solid cells with cell data; without such cells, its points.
 
     Cells that VTK hides as ghosts are left out. Boxes get columns with their sides (dx, dy, dz);
-    those of an image also get their indices (i, j, k).
+    those of an image or another structured grid also get their indices (i, j, k).
 
     Raises
     ------
@@ -77,8 +77,13 @@ def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
 
 def read_surface(path: Path) -> Surface:
     """Return a poly data file's faces; polygons are cut into triangles."""
+    import pyvista
+
     mesh = _read(path)
-    if not mesh.GetNumberOfPolys() + mesh.GetNumberOfStrips():
+    if isinstance(mesh, pyvista.UnstructuredGrid):
+        mesh = _faces_only(mesh)
+    faces = isinstance(mesh, pyvista.PolyData)
+    if not faces or not mesh.GetNumberOfPolys() + mesh.GetNumberOfStrips():
         raise InputError(f"{path}: holds no faces")
     triangles = mesh.triangulate()
     return Surface(
@@ -140,6 +145,9 @@ def _solid(mesh: Any) -> np.ndarray:
 
     if isinstance(mesh, pyvista.ImageData):
         return np.full(mesh.n_cells, min(mesh.dimensions) > 1 and bool(len(mesh.cell_data)))
+    if isinstance(mesh, pyvista.RectilinearGrid | pyvista.StructuredGrid):
+        filled = bool(len(mesh.cell_data)) or not len(mesh.point_data)
+        return np.full(mesh.n_cells, min(mesh.dimensions) > 1 and filled)
     if not isinstance(mesh, pyvista.UnstructuredGrid):
         return np.zeros(mesh.n_cells, dtype=bool)
     flat = {
@@ -162,8 +170,21 @@ def _with_sides(
         ijk = places([n - 1 for n in mesh.dimensions], "u")[keep]
         sides = np.broadcast_to(np.asarray(mesh.spacing, dtype=np.float64), ijk.shape)
         return with_sides(values, sides, ijk)
+    if isinstance(mesh, pyvista.RectilinearGrid | pyvista.StructuredGrid):
+        ijk = places([n - 1 for n in mesh.dimensions], "u")[keep]
+        box = _box_sides(mesh.cast_to_unstructured_grid(), keep)
+        return values if box is None else with_sides(values, box, ijk)
     box = _box_sides(mesh, keep)
     return values if box is None else with_sides(values, box)
+
+
+def _faces_only(grid: Any) -> Any:
+    """Return an unstructured grid whose cells all are faces as poly data, any other as it is."""
+    import pyvista
+
+    faces = [int(getattr(pyvista.CellType, name)) for name in ("TRIANGLE", "POLYGON", "QUAD")]
+    whole = np.isin(grid.celltypes, faces).all()
+    return pyvista.PolyData(grid.points, faces=grid.cells) if whole else grid
 
 
 def _box_sides(mesh: Any, keep: np.ndarray) -> Floats | None:

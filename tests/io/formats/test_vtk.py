@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geounfold.geometry.mesh import TriMesh
-from geounfold.io import read_points, read_surface, write_surface
+from geounfold.io import holds_surface, read_points, read_surface, write_surface
 from tests.io.formats.samples import by_corners, places, sides, tetrahedron
 
 
@@ -112,3 +112,55 @@ def test_vtk_reads_our_surfaces(tmp_path: Path, kind: str) -> None:
     # VTK reads PLY, OBJ and STL in single precision.
     atol = 0 if kind == ".vtp" else 0.125
     np.testing.assert_allclose(corners, mesh.V[mesh.F], rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("kind", ["grid.vtk", "image.vtk", "rectilinear.vtr", "structured.vts"])
+def test_legacy_and_structured_files_hold_the_blocks_of_an_image(tmp_path: Path, kind: str) -> None:
+    import pyvista
+
+    image = pyvista.ImageData(dimensions=(4, 3, 2), spacing=(10.0, 5.0, 2.0), origin=(100, 200, 50))
+    image.cell_data["grade"] = np.arange(6.0)
+    made = {
+        "grid.vtk": image.cast_to_unstructured_grid(),
+        "image.vtk": image,
+        "rectilinear.vtr": pyvista.RectilinearGrid(
+            np.arange(4) * 10.0 + 100, np.arange(3) * 5.0 + 200, np.array([50.0, 52.0])
+        ),
+        "structured.vts": image.cast_to_structured_grid(),
+    }[kind]
+    made.cell_data["grade"] = np.arange(6.0)
+    made.save(tmp_path / kind)
+    blocks = read_points(tmp_path / kind)
+    assert blocks.points[[0, 4]].tolist() == [[105.0, 202.5, 51.0], [115.0, 207.5, 51.0]]
+    assert blocks.numbers("grade").tolist() == list(range(6))
+    assert (sides(blocks) == [10.0, 5.0, 2.0]).all()
+    if kind != "grid.vtk":
+        assert places(blocks) == [[i, j, 0] for j in range(2) for i in range(3)]
+
+
+def test_uneven_blocks_of_a_rectilinear_grid(tmp_path: Path) -> None:
+    import pyvista
+
+    grid = pyvista.RectilinearGrid(np.array([0.0, 10, 15]), np.array([0.0, 4]), np.array([0.0, 2]))
+    grid.save(tmp_path / "b.vtr")
+    blocks = read_points(tmp_path / "b.vtr")
+    assert blocks.points.tolist() == [[5, 2, 1], [12.5, 2, 1]]
+    assert sides(blocks).tolist() == [[10, 4, 2], [5, 4, 2]]
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_legacy_surfaces(tmp_path: Path, binary: bool) -> None:
+    import pyvista
+
+    mesh = pyvista.Sphere(radius=10.0, theta_resolution=8, phi_resolution=8)
+    mesh.save(tmp_path / "s.vtk", binary=binary)
+    mesh.cast_to_unstructured_grid().save(tmp_path / "u.vtk", binary=binary)
+    ours = TriMesh(np.asarray(mesh.points, dtype=np.float64), mesh.regular_faces.astype(np.int64))
+    assert holds_surface(tmp_path / "s.vtk")
+    for name in ("s.vtk", "u.vtk"):
+        surface = read_surface(tmp_path / name)
+        assert np.array_equal(surface.F, ours.F)
+        # Text has six digits or more of coordinates up to 10.
+        np.testing.assert_allclose(surface.V, ours.V, rtol=0, atol=0 if binary else 1e-5)
+    pyvista.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "b.vtk")
+    assert not holds_surface(tmp_path / "b.vtk")

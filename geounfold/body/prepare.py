@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geounfold.body.check import check_points
+from geounfold.body.coarsest_cells import coarsest_cells
 from geounfold.body.fault_surface import FaultWalls
 from geounfold.body.lattice import Lattice, distinct, measure_lattice
 from geounfold.body.mending import MendingRecord, mend
@@ -141,6 +142,8 @@ def prepare(
     """
     lattice = measure_lattice(points)
     cells = filled_cells(points, lattice)
+    if cut is None:  # faults cut between single blocks
+        cells = coarsest_cells(points, lattice, cells)
     filled, lattice = (points, lattice) if cells is None else (cells.points, cells.lattice)
     frame = _frame(points, filled, lattice)
     work = np.ascontiguousarray(frame.snap(frame.to_work(filled)))

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.lattice import Lattice
 from geounfold.geometry.measures import sorted_distinct
-from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
 
 MOST_CELLS = 250_000
 """Number of cells above which parents are filled by coarser ones; about ten seconds' work."""
@@ -44,6 +44,8 @@ are no missing blocks; 17 to 20 in two blocks, 17 with 5 % missing.
 _LARGE = 0.01  # least share of the blocks in a part of the body that counts
 _ROUNDS = 2  # of filling: more would fill a gap from its end, where a position has 21 neighbours
 _DOUBLINGS = 5  # of the finest side that are tried as the parents' side
+_PARTS = 3  # halvings of a common gap that are tried as the finest side
+_CLEAR = 0.2  # share of the blocks that only parts in 3 or 5 explain, to take these
 _ODD = 0.01  # share of the blocks that may contradict the sides inferred
 _SEEN = 0.002  # least share of the aligned differences that equal a side
 
@@ -150,33 +152,76 @@ def _aligned_gap(q: Ints, axis: int) -> Ints:
 def _axis_sides(q: Ints, gap: Ints) -> tuple[int, int, Ints] | None:
     """Return the finest side, a corner of all blocks and every half side along one axis.
 
-    Blocks of side 2 L lie at ``corner + (2 i + 1) L``, so the corner and a centroid determine the
-    side. The gap between neighbours on one line is never below a side and mostly equal to it; the
-    corner chosen is the one with which most gaps agree.
+    The finest side is the shortest common gap. If that explains too few blocks, as for one row of
+    sub-blocks, which have no neighbours of their size along the axis, it is the largest half or
+    quarter of a common gap that explains them.
     """
     sizes, count = np.unique(gap[gap > 0], return_counts=True)
     common = sizes[count >= max(2, _SEEN * count.sum())] if len(sizes) else sizes
-    if not len(common) or common[0] % 2:
+    if not len(common):
         return None
-    fine = int(common[0])
+    parts = {
+        int(size) >> k for size in common for k in range(1, _PARTS + 1) if size % (1 << k) == 0
+    }
+    for fine in [int(common[0]), *sorted(parts, reverse=True)]:
+        found = None if fine % 2 else _sides_from(q, gap, fine)
+        if found is not None:
+            return fine, *found
+    return None
+
+
+def _sides_from(q: Ints, gap: Ints, fine: int) -> tuple[int, Ints] | None:
+    """Return a corner of all blocks and every half side along one axis, given the finest side.
+
+    Blocks of side 2 L lie at ``corner + (2 i + 1) L``, so the corner and a centroid determine the
+    side. The gap between neighbours on one line is mostly equal to a side, and never below the mean
+    of the two; the corner chosen is the one with which most gaps agree. First no gap below a side
+    is allowed, as if blocks of two sides never lay on one line.
+    """
     widest = fine << _DOUBLINGS
     kinds, number = np.unique(q % widest * (gap.max() + 1) + gap, return_counts=True)
     place, kind_gap = np.divmod(kinds, gap.max() + 1)
-    best, most = None, 0
-    for parent in (fine << np.arange(_DOUBLINGS + 1)).tolist():
+    for least in (0, fine // 2):  # half the side of the smallest neighbour; 0: equal sides
+        best, most = None, 0
+        for parent in (fine << np.arange(_DOUBLINGS + 1)).tolist():
+            for corner in range(parent):
+                half = _half_side((place - corner) % parent, fine, parent)
+                agree = int(number[(kind_gap == 2 * half) & (half > 0)].sum())
+                if agree > most and number[_odd(half, kind_gap, least)].sum() <= _ODD * len(q):
+                    best, most = (parent, corner), agree
+        thirds = _in_thirds(q, gap, fine, most)
+        if thirds is not None:
+            return thirds
+        if best is not None:
+            half = _half_side((q - best[1]) % best[0], fine, best[0])
+            return best[1], np.where(_odd(half, gap, least), fine // 2, half)
+    return None
+
+
+def _odd(half: Ints, gap: Ints, least: int) -> Bools:
+    """Return whether blocks cannot have half sides (n,), by the gaps to their neighbours (n,)."""
+    narrow = half + least if least else 2 * half
+    return (half == 0) | ((gap > 0) & (gap < narrow))
+
+
+def _in_thirds(q: Ints, gap: Ints, fine: int, agreeing: int) -> tuple[int, Ints] | None:
+    """Return a corner and every half side if parents are split in 3 or 5; None if they are not.
+
+    The middle one of an odd number of parts lies where its parent would. It is a part if its
+    neighbour on the line is as near as a part's. ``agreeing`` blocks agree with equal blocks or
+    with halves; thirds must explain clearly more.
+    """
+    for count in (3, 5):
+        parent = count * fine
         for corner in range(parent):
-            half = _half_side((place - corner) % parent, fine, parent)
-            agree = int(number[(kind_gap == 2 * half) & (half > 0)].sum())
-            if agree <= most:
-                continue
-            odd = (half == 0) | ((kind_gap > 0) & (kind_gap < 2 * half))
-            if number[odd].sum() <= _ODD * len(q):
-                best, most = (parent, corner), agree
-    if best is None:
-        return None
-    half = _half_side((q - best[1]) % best[0], fine, best[0])
-    odd = (half == 0) | ((gap > 0) & (gap < 2 * half))
-    return fine, best[1], np.where(odd, fine // 2, half)
+            place = (q - corner) % parent
+            whole = (place == parent // 2) & (gap != fine) & (parent % 2 == 0)
+            half = np.where(whole, parent // 2, np.where(place % fine == fine // 2, fine // 2, 0))
+            agree = int(((gap == 2 * half) & (half > 0)).sum())
+            odd = _odd(half, gap, fine // 2)
+            if agree >= agreeing + _CLEAR * len(q) and odd.mean() <= _ODD:
+                return corner, np.where(odd, fine // 2, half)
+    return None
 
 
 def _half_side(place: Ints, fine: int, parent: int) -> Ints:
@@ -198,9 +243,10 @@ def _filled(lattice: Lattice, q: Ints, fine: Ints, first: Ints, half: Ints) -> F
     count = 2 * half // fine
     total = int(count.prod(axis=1).sum())
     merge = 1
-    while total / merge**3 > MOST_CELLS and 2 * merge <= count.max():
+    halves = bool((count & (count - 1) == 0).all())  # else cells of 2 would cut across parents
+    while halves and total / merge**3 > MOST_CELLS and 2 * merge <= count.max():
         merge *= 2
-    if total > 64 * MOST_CELLS:
+    if total > (64 if halves else 4) * MOST_CELLS:
         return None
     cells, share = _merged(low, count, merge)
     if (share > 1 + 1e-9).mean() > _ODD:

@@ -78,7 +78,7 @@ def _joinable(cells: Ints) -> int | None:
 def _mean_run(box: OccupiedCells, axis: int) -> float:
     """Return the mean number of cells in a row along an axis."""
     starts = np.count_nonzero(~box.occupied(box.keys - int(box.stride[axis])))
-    return len(box.keys) / max(starts, 1)
+    return len(box.keys) / max(int(starts), 1)
 
 
 def _full(box: OccupiedCells, axis: int, count: int) -> bool:

@@ -201,7 +201,8 @@ def _sides_from(q: Ints, gap: Ints, fine: int) -> tuple[int, Ints] | None:
 def _odd(half: Ints, gap: Ints, least: int) -> Bools:
     """Return whether blocks cannot have half sides (n,), by the gaps to their neighbours (n,)."""
     narrow = half + least if least else 2 * half
-    return (half == 0) | ((gap > 0) & (gap < narrow))
+    odd: Bools = (half == 0) | ((gap > 0) & (gap < narrow))
+    return odd
 
 
 def _in_thirds(q: Ints, gap: Ints, fine: int, agreeing: int) -> tuple[int, Ints] | None:

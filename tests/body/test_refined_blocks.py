@@ -86,7 +86,7 @@ def test_few_split_blocks_fill_the_solid(parts: tuple[int, int, int]) -> None:
 @pytest.mark.parametrize("parts", [(2, 2, 2), (4, 4, 4)])
 def test_one_row_of_sub_blocks_on_an_edge(axis: int, parts: tuple[int, int, int]) -> None:
     """The row has no neighbours of its size across, so no gap shows its side."""
-    k = grid_cells(12, 10, 9)
+    k = grid_cells(24, 20, 18)
     slab, edge = k[k[:, axis] > 0], k[k[:, axis] == 0]
     fine = split(edge * SIDE, parts)
     last = fine[:, axis] > fine[:, axis].max() - 1e-6  # the part next to the slab
@@ -94,4 +94,6 @@ def test_one_row_of_sub_blocks_on_an_edge(axis: int, parts: tuple[int, int, int]
     found = solid(points)
     volume = len(found.points) * found.lattice.steps.prod()
     wanted = (len(slab) + len(edge) / parts[axis]) * SIDE**3
-    assert volume == pytest.approx(wanted, rel=1e-9)
+    # More than 250,000 quarters are joined to halves; a layer of quarters is then half a half.
+    joined = parts[axis] == 4
+    assert volume == pytest.approx(wanted, rel=0.015 if joined else 1e-9)

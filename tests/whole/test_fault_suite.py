@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
+import subprocess
+import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -138,3 +141,23 @@ def test_a_failure_is_a_row_with_its_place(
     runner.work(row, {}, cost=False)
     assert row.verdict == "failed"
     assert row.message.startswith("ZeroDivisionError: by nothing (test_fault_suite.py:")
+
+
+def test_a_run_of_one_body_writes_its_row_and_figures(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "<!-- designed -->\n<!-- end of designed -->\n<!-- groups -->\n<!-- end of groups -->\n"
+    )
+    run = subprocess.run(
+        [sys.executable, TESTS / "soak" / "faults.py", "--body", "strike_slip", "--way", "surfaces",
+         "--table", tmp_path / "t.csv", "--summary", tmp_path / "s.json", "--page", page],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout + run.stderr
+    row = json.loads((tmp_path / "s.json").read_text())["rows"][0]
+    assert (row["verdict"], row["found"], row["certified"]) == ("right", 2, "yes")
+    assert row["rms"] < 0.35  # 0.16 as measured; 3 as one body
+    assert row["jump"] < 0.5 < 8 < row["slip"]
+    assert row["throw_off"] < 0.5
+    assert (tmp_path / "t.csv").read_text().count("\n") == 2
+    assert "`strike_slip`" in page.read_text()

@@ -1,11 +1,12 @@
 """Take the faults out of bodies whose truth is known, each body in a process of its own.
 
-    python tests/soak/faults.py [--random 100] [--body NAME ...] [--way WAY ...] [--jobs 1]
-                                [--seconds 120] [--memory 6000] [--option NAME=VALUE ...]
-                                [--cost] [--table FILE.csv] [--summary FILE.json] [--page FILE.md]
+    python tests/soak/faults.py [--random 100] [--wide 40] [--body NAME ...] [--way WAY ...]
+                                [--jobs 1] [--seconds 120] [--memory 6000]
+                                [--option NAME=VALUE ...] [--cost] [--table FILE.csv]
+                                [--summary FILE.json] [--page FILE.md]
 
-Bodies are ``FAULTED_CASES`` of ``geounfold.synthetic.faulted`` and ``random_faulted(seed)``.  A way
-is what geounfold is given besides the blocks:
+Bodies are ``FAULTED_CASES`` of ``geounfold.synthetic.faulted`` and ``random_faulted(seed)``
+of both families.  A way is what geounfold is given besides the blocks:
 
   surfaces   the exact fault surfaces
   ids        the true fault block of every block, no surface
@@ -33,6 +34,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -53,6 +55,7 @@ PAGE = ROOT / "docs" / "results" / "faults.md"
 VERDICTS = ("right", "told", "refused", "silent", "failed", "timeout")
 MOST_RMS = 0.5  # blocks
 DRAWN = ("thrust_5T", "listric", "crossing", "branch")  # bodies whose surfaces are drawn otherwise
+DRAWN_NAME = re.compile(r"(plain|wide)(\d+)")
 NEAR = 24  # blocks of a wall that carry a rock's half into the answer
 NAN = float("nan")
 
@@ -95,8 +98,10 @@ def body_of(name: str, way: str) -> Any:
     """Return a body by its name, its surfaces drawn as the way says."""
     from geounfold.synthetic import faulted
 
-    random = name.startswith("random")
-    body = faulted.random_faulted(int(name[6:])) if random else faulted.simulate_faulted(name)
+    drawn = DRAWN_NAME.fullmatch(name)
+    body = (
+        faulted.random_faulted(int(drawn[2]), drawn[1]) if drawn else faulted.simulate_faulted(name)
+    )
     return faulted.drawn_otherwise(body, way) if way in faulted.VARIANTS else body
 
 
@@ -272,7 +277,8 @@ def chosen(args: argparse.Namespace) -> list[Row]:
     """Return the rows to fill in: body by body, way by way."""
     from geounfold.synthetic.faulted import FAULTED_CASES, VARIANTS
 
-    names = [*FAULTED_CASES, *(f"random{seed}" for seed in range(args.random))]
+    names = [*FAULTED_CASES, *(f"plain{seed}" for seed in range(args.random))]
+    names += [f"wide{seed}" for seed in range(args.wide)]
     names = args.body or names
     rows = []
     for way in args.way or ["surfaces", "ids", *VARIANTS]:
@@ -346,7 +352,8 @@ def figures_of(rows: list[Row]) -> dict[str, Any]:
 
 def group_of(row: Row) -> str:
     """Return the group whose figures a row enters."""
-    return ("random" if row.name.startswith("random") else "designed") + f", {row.way}"
+    drawn = DRAWN_NAME.fullmatch(row.name)
+    return f"{f'random, {drawn[1]}' if drawn else 'named'}, {row.way}"
 
 
 def summarise(rows: list[Row], args: argparse.Namespace) -> dict[str, Any]:
@@ -432,6 +439,7 @@ def parse(argv: list[str] | None) -> argparse.Namespace:
     """Return the arguments."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--random", type=int, default=100, help="bodies drawn from seeds 0, 1, ...")
+    parser.add_argument("--wide", type=int, default=40, help="bodies of the wide family")
     parser.add_argument("--body", action="append", default=[], help="these bodies only")
     parser.add_argument("--way", action="append", default=[], help="these ways only")
     parser.add_argument("--jobs", type=int, default=1)

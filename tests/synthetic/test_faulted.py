@@ -26,6 +26,7 @@ from geounfold.synthetic.faulted import (
 )
 
 NAMES = list(FAULTED_CASES)
+EVERY = [*NAMES, *(f"plain{seed}" for seed in range(6)), *(f"wide{seed}" for seed in range(8))]
 # Fault blocks by design: one more than the faults, or one for each combination that exists.
 BLOCKS = {"graben": 3, "horst": 3, "branch": 3, "crossing": 4, "domino": 5, "network": 15}
 PARTED = {"normal_3T", "thrust_5T"}  # slips that leave no block beside another
@@ -34,11 +35,12 @@ PLANE = PlanarFault(name="f1", point=(200, 150, 0), strike=0, dip=60, dip_slip=5
 
 @pytest.fixture(scope="module")
 def bodies() -> dict[str, FaultedBody]:
-    drawn = {f"random{seed}": random_faulted(seed) for seed in range(6)}
+    drawn = {f"plain{seed}": random_faulted(seed) for seed in range(6)}
+    drawn |= {f"wide{seed}": random_faulted(seed, "wide") for seed in range(8)}
     return {name: simulate_faulted(name) for name in NAMES} | drawn
 
 
-@pytest.mark.parametrize("name", [*NAMES, *(f"random{seed}" for seed in range(6))])
+@pytest.mark.parametrize("name", EVERY)
 def test_truth_folds_and_faults_back_to_the_blocks(
     bodies: dict[str, FaultedBody], name: str
 ) -> None:
@@ -53,7 +55,7 @@ def test_truth_folds_and_faults_back_to_the_blocks(
     assert len(np.unique(body.folded, axis=0)) == n
 
 
-@pytest.mark.parametrize("name", [*NAMES, *(f"random{seed}" for seed in range(6))])
+@pytest.mark.parametrize("name", EVERY)
 def test_folds_and_faults_keep_the_volume(bodies: dict[str, FaultedBody], name: str) -> None:
     body = bodies[name]
     spec = body.spec
@@ -283,6 +285,7 @@ POINT = (0.0, 0.0, 0.0)
         (lambda: simulate_faulted("no_such"), "no faulted body is named 'no_such'; valid: normal"),
         (lambda: simulate_faulted("tip", steps=(1e4, 1e4, 1e4)), "no block of tip lies in"),
         (lambda: simulate_faulted("tip", colour=1), "no option 'colour'; valid: events"),
+        (lambda: random_faulted(1, "other"), "family 'other' is not one of: plain, wide"),
         (lambda: random_faulted(-1), "seed must be a whole number from 0 up"),
         (lambda: drawn_otherwise(simulate_faulted("tip"), "torn"), "no variant is named 'torn'"),
         (lambda: FaultedSpec(events=(FOLD,)), "needs a fault among its events"),

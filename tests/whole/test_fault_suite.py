@@ -88,17 +88,17 @@ def test_ways_give_what_they_say(runner: ModuleType, body: FaultedBody) -> None:
     assert set(runner.given(body, "both")) == {"faults", "fault_blocks"}
     off = runner.body_of("normal_1T", "off_one")
     assert not np.array_equal(off.surfaces["f1"][0], body.surfaces["f1"][0])
-    assert runner.body_of("random3", "ids").name == "random3"
+    assert runner.body_of("wide3", "ids").name == "wide3"
 
 
 def test_every_body_is_chosen_once_for_each_of_its_ways(runner: ModuleType) -> None:
-    args = argparse.Namespace(random=5, body=[], way=[])
+    args = argparse.Namespace(random=5, wide=3, body=[], way=[])
     rows = runner.chosen(args)
     keys = [(row.name, row.way) for row in rows]
     assert len(set(keys)) == len(keys)
     n = len(FAULTED_CASES)
-    assert len(keys) == n + 5 + n + len(VARIANTS) * len(runner.DRAWN)
-    args = argparse.Namespace(random=5, body=["tip"], way=["ids"])
+    assert len(keys) == n + 5 + 3 + n + len(VARIANTS) * len(runner.DRAWN)
+    args = argparse.Namespace(random=5, wide=3, body=["tip"], way=["ids"])
     assert [(row.name, row.way) for row in runner.chosen(args)] == [("tip", "ids")]
 
 
@@ -111,6 +111,9 @@ def test_groups_count_refusals_as_wrong(runner: ModuleType) -> None:
     assert (f["bodies"], f["answered"], f["within_half"], f["within_one"]) == (4, 3, 1, 2)
     assert f["rms_median"] == 0.7
     assert f["above_one_untold"] == ["tip"]
+    assert [runner.group_of(runner.Row(n)) for n in ("tip", "plain1", "wide2")] == [
+        "named, surfaces", "random, plain, surfaces", "random, wide, surfaces"
+    ]  # fmt: skip
     empty = runner.figures_of([runner.Row("tip", verdict="failed")])
     assert empty["rms_median"] is None
 

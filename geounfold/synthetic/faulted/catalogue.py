@@ -8,80 +8,22 @@ from types import MappingProxyType
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.geometry.mesh import Floats
 from geounfold.synthetic.faulted.body import FaultedBody
 from geounfold.synthetic.faulted.events import (
     Event,
     Fault,
-    FoldEvent,
     ListricFault,
     PlanarFault,
     ScissorFault,
     TipFault,
-    fault_axes,
 )
+from geounfold.synthetic.faulted.pieces import drag, splay, waves
+from geounfold.synthetic.faulted.random_wide import wide_spec
 from geounfold.synthetic.faulted.recipe import FaultedSpec, Outline, Oval, Rectangle, Wandering
 from geounfold.synthetic.faulted.sampling import sample
-from geounfold.synthetic.profile import Bump, Profile, Sinusoid
 
 _MIDDLE = (200.0, 150.0, 0.0)
 _INF = float("inf")
-
-
-def _waves(
-    amplitude: float,
-    wavelength: float = 420.0,
-    phase: float = 0.0,
-    *,
-    length: float = 700.0,
-    start: float = -150.0,
-    reach: float = 60.0,
-    azimuth: float = 0.0,
-) -> FoldEvent:
-    """Return sinusoidal folds."""
-    wave = Sinusoid(amplitude=amplitude, wavelength=wavelength, phase=phase)
-    return FoldEvent(
-        profile=Profile(elements=(wave,)),
-        length=length,
-        reach=reach,
-        start=start,
-        azimuth=azimuth,
-    )
-
-
-def _drag(at: float, degrees: float, reach: float = 60.0) -> FoldEvent:
-    """Return a flexure that takes up part of a throw before the fault breaks the layer.
-
-    Positive degrees bend the layer down with growing x, as a fault dipping to x does.
-    """
-    bend = Bump(amplitude=-degrees, at=at + 150, width=35)
-    return FoldEvent(profile=Profile(elements=(bend,)), length=700, reach=reach, start=-150)
-
-
-def _splay(
-    planes: tuple[tuple[float, float], tuple[float, float]],
-    slips: tuple[float, float],
-    point: tuple[float, float, float],
-) -> tuple[PlanarFault, PlanarFault]:
-    """Return two faults of (strike, dip), the second in the hanging wall of the first.
-
-    Both slip along the line in which they meet, the only rigid way in which three blocks can part.
-    """
-    line = np.cross(fault_axes(*planes[0])[2], fault_axes(*planes[1])[2])
-    line *= -np.sign(line[2]) / np.linalg.norm(line)
-    main, branch = (_along(line, plane, slip) for plane, slip in zip(planes, slips, strict=True))
-    return (
-        PlanarFault(name="f1", point=point, strike=planes[0][0], dip=planes[0][1],
-                    strike_slip=main[0], dip_slip=main[1]),
-        PlanarFault(name="f2", point=point, strike=planes[1][0], dip=planes[1][1],
-                    strike_slip=branch[0], dip_slip=branch[1], within=(("f1", True),)),
-    )  # fmt: skip
-
-
-def _along(line: Floats, plane: tuple[float, float], slip: float) -> tuple[float, float]:
-    """Return strike slip and dip slip, on a plane, of a slip along a line in it."""
-    along, down, _ = fault_axes(*plane)
-    return slip * float(line @ along), slip * float(line @ down)
 
 
 def _dominoes(slips: tuple[float, ...]) -> tuple[PlanarFault, ...]:
@@ -122,35 +64,35 @@ def _fault(
 
 _CASES: dict[str, FaultedSpec] = {
     "normal_small": FaultedSpec(
-        events=(_fault(10, 60, 15), _waves(30, reach=90)),
+        events=(_fault(10, 60, 15), waves(30, reach=90)),
         about="throw 0.3 T, faulted then folded",
     ),
     "normal_1T": FaultedSpec(
-        events=(_waves(35), _fault(8, 60, 50)),
+        events=(waves(35), _fault(8, 60, 50)),
         about="1 T, folded then faulted",
     ),
     "normal_3T": FaultedSpec(
         events=(
             _fault(-12, 65, 150, point=(190, 150, 0)),
-            _waves(30, 500, reach=220, length=900, start=-250),
+            waves(30, 500, reach=220, length=900, start=-250),
         ),
         about="3 T, faulted then folded",
     ),
     "reverse_1T": FaultedSpec(
-        events=(_waves(25, phase=40), _fault(5, 45, -60, point=(210, 150, 0))),
+        events=(waves(25, phase=40), _fault(5, 45, -60, point=(210, 150, 0))),
         about="reverse, 1.2 T",
     ),
     "thrust_5T": FaultedSpec(
-        events=(_waves(25, phase=90), _fault(-6, 30, -250, point=(180, 150, 0))),
+        events=(waves(25, phase=90), _fault(-6, 30, -250, point=(180, 150, 0))),
         about="thrust of 5 T, long overlap",
     ),
     "strike_slip": FaultedSpec(
-        events=(_waves(35), _fault(15, 85, 4, 90)),
+        events=(waves(35), _fault(15, 85, 4, 90)),
         outline=Wandering(25, 3),
         about="1.8 T along strike, wandering outline",
     ),
     "strike_straight": FaultedSpec(
-        events=(_fault(0, 90, 0, 80), _waves(30)),
+        events=(_fault(0, 90, 0, 80), waves(30)),
         length=420,
         width=320,
         outline=Oval(),
@@ -158,7 +100,7 @@ _CASES: dict[str, FaultedSpec] = {
     ),
     "wavy_oblique": FaultedSpec(
         events=(
-            _waves(30),
+            waves(30),
             PlanarFault(name="f1", point=_MIDDLE, strike=5, dip=70, dip_slip=40, strike_slip=30,
                         amplitude=14, wavelength=170, phase=0.5),
         ),
@@ -166,14 +108,14 @@ _CASES: dict[str, FaultedSpec] = {
     ),
     "listric": FaultedSpec(
         events=(
-            _waves(25, phase=30),
+            waves(25, phase=30),
             ListricFault(name="f1", point=(190, 150, 0), strike=4, dip=60, radius=260, angle=14),
         ),
         about="hanging wall turned 14 degrees on an arc",
     ),
     "scissor": FaultedSpec(
         events=(
-            _waves(30),
+            waves(30),
             ScissorFault(name="f1", point=_MIDDLE, strike=0, dip=70, angle=9, dip_slip=10),
         ),
         about="throw changes sign along strike",
@@ -182,14 +124,14 @@ _CASES: dict[str, FaultedSpec] = {
         events=(
             _fault(5, 60, 45, point=(140, 150, 0)),
             _fault(175, 60, 70, point=(300, 150, 0), name="f2"),
-            _waves(25, 500, reach=160, length=800, start=-200),
+            waves(25, 500, reach=160, length=800, start=-200),
         ),
         length=440,
         about="two faults that dip towards each other",
     ),
     "crossing": FaultedSpec(
         events=(
-            _waves(30),
+            waves(30),
             _fault(0, 65, 40, point=(210, 150, 0)),
             _fault(80, 70, 55, point=(210, 160, 0), name="f2"),
         ),
@@ -199,8 +141,8 @@ _CASES: dict[str, FaultedSpec] = {
     ),
     "branch": FaultedSpec(
         events=(
-            _waves(25, 500, length=800, start=-200),
-            *_splay(((0, 65), (60, 70)), (60, 45), (190, 150, 0)),
+            waves(25, 500, length=800, start=-200),
+            *splay(((0, 65), (60, 70)), (60, 45), (190, 150, 0)),
         ),
         length=440,
         width=340,
@@ -208,51 +150,51 @@ _CASES: dict[str, FaultedSpec] = {
         about="a splay in the hanging wall",
     ),
     "domino": FaultedSpec(
-        events=(_waves(20, 600, length=800, start=-200), *_dominoes((35, 60, 25, 45))),
+        events=(waves(20, 600, length=800, start=-200), *_dominoes((35, 60, 25, 45))),
         length=520,
         width=260,
         about="four faults in a row",
     ),
     "tip": FaultedSpec(
         events=(
-            _waves(30),
+            waves(30),
             TipFault(name="f1", point=_MIDDLE, strike=0, dip=65, dip_slip=45, fade=200, tip=70),
         ),
         about="dies out inside the body",
     ),
     "overturned": FaultedSpec(
-        events=(_waves(88, 460, 200), _fault(20, 55, 55, point=(170, 150, 20))),
+        events=(waves(88, 460, 200), _fault(20, 55, 55, point=(170, 150, 20))),
         about="overturned limbs",
     ),
     "cropped": FaultedSpec(
-        events=(_waves(30), _fault(0, 65, 30, 60)),
+        events=(waves(30), _fault(0, 65, 30, 60)),
         width=420,
         crop=((-_INF, 60, -_INF), (_INF, 340, _INF)),
         about="no outline marks the strike slip",
     ),
     "swell": FaultedSpec(
-        events=(_waves(30), _fault(5, 65, 40, 60)),
+        events=(waves(30), _fault(5, 65, 40, 60)),
         swell=0.35,
         outline=Wandering(25, 7),
         about="thickness varies, oblique slip",
     ),
     # Bodies beyond the measured prototype's eighteen.
     "drag_normal": FaultedSpec(
-        events=(_drag(190, 35), _fault(0, 60, 40, point=(190, 150, 0))),
+        events=(drag(190, 35), _fault(0, 60, 40, point=(190, 150, 0))),
         about="normal, a flexure beside the fault",
     ),
     "drag_reverse": FaultedSpec(
-        events=(_drag(200, -35), _fault(0, 50, -40)),
+        events=(drag(200, -35), _fault(0, 50, -40)),
         about="reverse, a flexure beside the fault",
     ),
     "oblique_reverse": FaultedSpec(
-        events=(_waves(30), _fault(10, 55, -45, 45)),
+        events=(waves(30), _fault(10, 55, -45, 45)),
         outline=Wandering(25, 11),
         about="reverse and along strike alike",
     ),
     "horst": FaultedSpec(
         events=(
-            _waves(25, 500, length=800, start=-200),
+            waves(25, 500, length=800, start=-200),
             _fault(175, 62, 50, point=(140, 150, 0)),
             _fault(5, 62, 35, point=(300, 150, 0), name="f2"),
         ),
@@ -260,30 +202,30 @@ _CASES: dict[str, FaultedSpec] = {
         about="two faults that dip away from each other",
     ),
     "fold_fault_fold": FaultedSpec(
-        events=(_waves(20), _fault(8, 62, 45), _waves(20, 500, reach=160, azimuth=70, length=900,
+        events=(waves(20), _fault(8, 62, 45), waves(20, 500, reach=160, azimuth=70, length=900,
                                                       start=-300)),
         about="folded, faulted, folded across",
     ),
     "network": FaultedSpec(
-        events=(_waves(20, 700, length=1300, start=-200), *_network()),
+        events=(waves(20, 700, length=1300, start=-200), *_network()),
         length=840,
         width=600,
         about="six crossing faults, fifteen fault blocks",
     ),
     "flat_blocks": FaultedSpec(
-        events=(_waves(30), _fault(12, 62, 50)),
+        events=(waves(30), _fault(12, 62, 50)),
         steps=(12.0, 10.0, 5.0),
         bearing=25.0,
         offset=(452_300.0, 6_851_700.0, 310.0),
         about="blocks 12 x 10 x 5, turned lattice, national grid",
     ),
     "sub_blocked": FaultedSpec(
-        events=(_waves(30), _fault(8, 62, 50)),
+        events=(waves(30), _fault(8, 62, 50)),
         sub_blocks=2,
         about="blocks of 10 and 5 m",
     ),
     "scattered": FaultedSpec(
-        events=(_waves(30), _fault(8, 62, 50)),
+        events=(waves(30), _fault(8, 62, 50)),
         grid="scattered",
         about="points without a lattice",
     ),
@@ -291,6 +233,10 @@ _CASES: dict[str, FaultedSpec] = {
 
 FAULTED_CASES: Mapping[str, FaultedSpec] = MappingProxyType(_CASES)
 """Recipes of the named faulted bodies, by name; read-only."""
+
+
+RANDOM_FAMILIES = ("plain", "wide")
+"""Families of `random_faulted`."""
 
 
 def simulate_faulted(
@@ -336,8 +282,8 @@ def simulate_faulted(
     return sample(name, spec if blocks is None else spec.with_blocks(blocks))
 
 
-def random_faulted(seed: int, **overrides: object) -> FaultedBody:
-    """Return a body with one to three planar, corrugated or listric faults, drawn from a seed.
+def random_faulted(seed: int, family: str = "plain", **overrides: object) -> FaultedBody:
+    """Return a faulted body drawn from a seed.
 
     Sizes, outlines, dips, rakes, folds and the order of folding and faulting vary.
 
@@ -345,17 +291,25 @@ def random_faulted(seed: int, **overrides: object) -> FaultedBody:
     ----------
     seed : int
         Equal seeds give equal bodies, bit for bit.
+    family : {'plain', 'wide'}
+        ``plain``: one to three planar, corrugated or listric faults that cross the length, cubic
+        blocks. ``wide``: dominoes, grabens, horsts, crossing faults, splays, scissor faults, tips
+        and drag too, with other block sides, turned lattices, sub-blocks and cropped models.
     **overrides
         Other values of FaultedSpec fields.
 
     Raises
     ------
     OptionError
-        The seed is no whole number from 0 up, or a value is outside its range.
+        The seed is no whole number from 0 up, the family is unknown, or a value is outside its
+        range.
     """
     if not isinstance(seed, int) or seed < 0:
         raise OptionError(f"seed must be a whole number from 0 up, not {seed!r}")
-    return sample(f"random{seed}", _random_spec(seed).with_options(**overrides))
+    if family not in RANDOM_FAMILIES:
+        raise OptionError(f"family {family!r} is not one of: {', '.join(RANDOM_FAMILIES)}")
+    spec = _random_spec(seed) if family == "plain" else wide_spec(seed)
+    return sample(f"{family}{seed}", spec.with_options(**overrides))
 
 
 def _random_spec(seed: int) -> FaultedSpec:
@@ -375,7 +329,7 @@ def _random_spec(seed: int) -> FaultedSpec:
         faults.append(fault)
         total += size
     room = total if faulted_first else 0.0
-    fold = _waves(
+    fold = waves(
         rng.uniform(10, 40),
         max(rng.uniform(350, 700), 3 * room),
         rng.uniform(0, 360),

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from geounfold.io.block_sizes import block_model
     from geounfold.io.solids import fill
     from geounfold.mapping.control_mesh import ControlMesh
-    from geounfold.mapping.domain_map import DomainMap, load
-    from geounfold.mapping.mesh_map import UnfoldingMap
+    from geounfold.mapping.domain_map import DomainMap, load_domains
+    from geounfold.mapping.mesh_map import UnfoldingMap, load
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
     from geounfold.quality.truth import aligned_rms
     from geounfold.synthetic import simulate
@@ -78,7 +78,8 @@ _HOMES = {
     "Flattening": "flattening",
     "flatten": "flattening",
     "UnfoldingMap": "mapping.mesh_map",
-    "load": "mapping.domain_map",
+    "load": "mapping.mesh_map",
+    "load_domains": "mapping.domain_map",
     "DomainMap": "mapping.domain_map",
     "map_partitions": "unfolding.dask_map",
     "TetMesh": "geometry.mesh",
@@ -133,6 +134,7 @@ __all__ = [
     "fit_variogram",
     "flatten",
     "load",
+    "load_domains",
     "map_partitions",
     "neighbours",
     "nmd",

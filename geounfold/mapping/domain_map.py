@@ -103,7 +103,7 @@ class DomainMap(Mapping[str, UnfoldingMap]):
         return self.carry(points, domains, inverse=True).points
 
     def save(self, path: str | Path | BinaryIO) -> None:
-        """Write all maps into one file; ``geounfold.load`` reads it."""
+        """Write all maps into one file; ``geounfold.load_domains`` reads it."""
         contents = {}
         for name, saved in self.maps.items():
             stream = io.BytesIO()
@@ -112,19 +112,16 @@ class DomainMap(Mapping[str, UnfoldingMap]):
         write_domains(path, self.column, contents)
 
 
-def load(path: str | Path) -> UnfoldingMap | DomainMap:
-    """Read a map, or the maps of several domains, written by ``save``.
+def load_domains(path: str | Path) -> DomainMap:
+    """Read the maps of several domains, written by ``DomainMap.save`` or ``Domains.save``.
 
     Raises
     ------
     InputError
-        No such file, not a map, of another version, or damaged.
+        No such file, not the maps of domains, of another version, or damaged.
     """
-    return load_domains(path) if holds_domains(path) else mesh_map.load(path)
-
-
-def load_domains(path: str | Path) -> DomainMap:
-    """Read the maps of several domains."""
+    if not holds_domains(path):
+        raise InputError(f"{path}: holds no maps of domains; geounfold.load reads a single map")
     column, contents = read_domains(path)
     return DomainMap(
         column,

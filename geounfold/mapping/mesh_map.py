@@ -20,6 +20,7 @@ from geounfold.mapping.body_cells import BodyCells
 from geounfold.mapping.carried import Carried, Returned, checked_points
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.mapping.distortion import deformation_gradients
+from geounfold.mapping.domain_file import holds_domains
 from geounfold.mapping.fault_space import JoinedSpace
 from geounfold.mapping.map_file import arrays_of, read_arrays, write_arrays
 from geounfold.mapping.mesh_space import MeshImage, MeshSpace
@@ -455,8 +456,13 @@ def load(path: str | Path) -> UnfoldingMap:
     Raises
     ------
     InputError
-        No such file, not a map, of another version, or damaged.
+        No such file, not a map of one body, of another version, or damaged.
     """
+    if holds_domains(path):
+        raise InputError(
+            f"{path}: holds the maps of several domains; geounfold.load_domains reads it, and "
+            "--domain NAME chooses one"
+        )
     return _of_arrays(read_arrays(path))
 
 

@@ -115,7 +115,7 @@ class Domains(Mapping[str, Unfolding]):
         return DomainMap(self.column, maps)
 
     def save(self, path: str | Path | BinaryIO) -> None:
-        """Write the maps of all domains into one file; ``geounfold.load`` reads it."""
+        """Write the maps of all domains into one file; ``geounfold.load_domains`` reads it."""
         self.map.save(path)
 
     def check(self) -> None:

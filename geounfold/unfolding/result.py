@@ -13,13 +13,14 @@ from geounfold.body.parts import Junction
 from geounfold.errors import OptionError
 from geounfold.geometry.mesh import Bools, Floats, Ints, Space, TriMesh, in_space
 from geounfold.io.result_columns import FOLDED, UNFOLDED, result_columns, with_carried
+from geounfold.io.selection.mixed import box_told, mixed_frame
 from geounfold.io.tables.parted import spread_columns
 from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
 from geounfold.surfaces.hull import Hull
 from geounfold.unfolding.measured import in_world
 from geounfold.unfolding.notebook_card import Facts
-from geounfold.unfolding.summary import RunRecord, summarise, warnings_of
+from geounfold.unfolding.summary import RunRecord, full_box, summarise, warnings_of
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -365,7 +366,14 @@ class Unfolding:
 
     def summary(self) -> dict[str, Any]:
         """Return what ran and how good it is, ready for JSON."""
-        return summarise(self._record, self.surfaces)
+        found = summarise(self._record, self.surfaces)
+        return {**found, "warnings": [*self._notes(), *found["warnings"]]}
+
+    def _notes(self) -> list[str]:
+        """Return what the DataFrame's columns tell of other rock among the rows."""
+        if self._given is None or self.chosen is not None or self._given.shape[1] <= 3:
+            return []
+        return [n for n in (mixed_frame(self._given), box_told(full_box(self._record))) if n]
 
     @property
     def injective(self) -> bool:
@@ -386,7 +394,7 @@ class Unfolding:
             trust=None if self.trust is None else self.trust.word,
             round_trip=self.round_trip_max,
             seconds=sum(self.seconds.values()),
-            warnings=warnings_of(self._record),
+            warnings=[*self._notes(), *warnings_of(self._record)],
         )
 
     def __repr__(self) -> str:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from geounfold.faults.rejoin import Faulting
 from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
 from geounfold.io.selection import read_where
+from geounfold.io.selection.mixed import mixed_frame
 from geounfold.io.tables.points import chosen_rows
 from geounfold.mapping.body_cells import BodyCells
 from geounfold.mapping.carried import checked_points
@@ -61,7 +63,25 @@ class _Clock:
             self.seconds[name] = self.seconds.get(name, 0.0) + taken
 
 
+def _hinting(run: Callable[..., Unfolding]) -> Callable[..., Unfolding]:
+    """Name the columns of rock that vary behind an error, if the user chose no rows."""
+
+    @wraps(run)
+    def hinted(points: Any, *args: Any, **more: Any) -> Unfolding:
+        try:
+            return run(points, *args, **more)
+        except GeounfoldError as error:
+            frame = isinstance(points, pd.DataFrame) and more.get("where") is None
+            hint = mixed_frame(points) if frame else ""
+            if not hint:
+                raise
+            raise type(error)(f"{error}; {hint}") from error
+
+    return hinted
+
+
 @one_thread()
+@_hinting
 def unfold(  # the inputs on faults belong together, and to the points as top and bottom do
     points: Floats | pd.DataFrame | FilledSolid,
     options: UnfoldOptions | None = None,

@@ -179,6 +179,16 @@ def warnings_of(run: RunRecord) -> list[str]:
     return out
 
 
+def full_box(run: RunRecord) -> list[int] | None:
+    """Return the sides of the lattice's box in blocks if the blocks fill it; None else."""
+    cells = run.prepared.cells
+    if cells is None or not len(cells):
+        return None
+    sides = np.ptp(cells, axis=0) + 1
+    full = len(cells) >= np.prod(sides.astype(np.float64))
+    return [int(side) for side in sides] if full else None
+
+
 def _apart(run: RunRecord) -> Ints:
     """Return the rows of the points that are in none of the bodies to unfold."""
     rest = np.ones(len(run.prepared.points), dtype=bool)
@@ -253,7 +263,8 @@ def _lattice(run: RunRecord) -> dict[str, Any]:
     spacing = run.prepared.frame.scale
     if run.prepared.lattice is None:
         return {"found": False, "spacing": spacing}
-    return {"found": True, "spacing": spacing, "steps": run.prepared.lattice.steps.tolist()}
+    steps = run.prepared.lattice.steps.tolist()
+    return {"found": True, "spacing": spacing, "steps": steps, "full_box": full_box(run)}
 
 
 def _hull(run: RunRecord) -> dict[str, Any]:

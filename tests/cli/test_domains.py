@@ -97,7 +97,9 @@ def test_the_library_gives_the_same(folder: Path, tmp_path: Path) -> None:
     assert found.rows["outcome"].tolist() == ["proved"] * 3
     found.save(tmp_path / "m.npz")
     assert (tmp_path / "m.npz").read_bytes() == (folder / "m.npz").read_bytes()
-    saved = gu.load(tmp_path / "m.npz")
+    with pytest.raises(gu.InputError, match="load_domains"):
+        gu.load(tmp_path / "m.npz")
+    saved = gu.load_domains(tmp_path / "m.npz")
     assert isinstance(saved, gu.DomainMap)
     points = model[["x", "y", "z"]].to_numpy(float)
     image = saved.to_flat(points, model["DOMAIN"])
@@ -216,7 +218,7 @@ def test_maps_of_one_body_and_of_several_are_told_apart(
     broken.write_bytes((folder / "m.npz").read_bytes()[:-2000])
     assert main(["map", str(broken), str(folder / "model.csv"), "-o", str(tmp_path / "o.csv")]) == 2
     one = tmp_path / "one.npz"
-    gu.load(folder / "m.npz")["SEAM"].save(one)
+    gu.load_domains(folder / "m.npz")["SEAM"].save(one)
     words = ["map", str(one), str(folder / "model.csv"), "-o", str(tmp_path / "o.csv")]
     assert main([*words, "--by", "DOMAIN"]) == 2
     assert "--by needs a map of domains" in capsys.readouterr().err

@@ -281,8 +281,10 @@ def test_one_line_says_whether_to_trust_it(unfolded: gu.Unfolding) -> None:
         ": not proved one-to-one;" in replace(FACTS, faults=["8 inverted"], warnings=["a"]).line()
     )
     n = len(unfolded.folded)
-    line = rf"<Unfolding of {n} points by sheet: proved one-to-one; epsilon 0\.\d{{4}}, 0 outside>"
+    told = "proved one-to-one, 1 warning;"  # the column rock varies, and no rows were chosen
+    line = rf"<Unfolding of {n} points by sheet: {told} epsilon 0\.\d{{4}}, 0 outside>"
     assert re.fullmatch(line, repr(unfolded))
+    assert "column rock varies (" in unfolded.summary()["warnings"][0]
 
 
 def test_notebooks_show_a_table(unfolded: gu.Unfolding) -> None:

@@ -15,7 +15,7 @@ from geounfold.cli.inputs.grades import check_grade_options, exploration
 from geounfold.cli.inputs.points import files_given
 from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
 from geounfold.cli.terminal.console import Console
-from geounfold.errors import OptionError
+from geounfold.errors import GeounfoldError, OptionError
 from geounfold.io import Outputs
 
 if TYPE_CHECKING:
@@ -41,15 +41,22 @@ def run(args: Namespace, console: Console) -> None:
         return
     from geounfold.unfolding import run as unfolding
 
-    result = unfolding.unfold(
-        body.points,
-        options,
-        progress=console.stage,
-        top=body.top,
-        bottom=body.bottom,
-        **body.faults,
-    )
+    try:
+        result = unfolding.unfold(
+            body.points,
+            options,
+            progress=console.stage,
+            top=body.top,
+            bottom=body.bottom,
+            **body.faults,
+        )
+    except GeounfoldError as error:
+        if not body.hint:
+            raise
+        raise type(error)(f"{error}; {body.hint}") from error
     summary = {**result.summary(), "command": command_line(args)}
+    notes = [body.hint, body.box_hint(summary)]
+    summary["warnings"] = [*filter(None, notes), *summary.get("warnings", [])]
     if args.crosscheck:
         from geounfold.comparison.crosscheck import crosscheck
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from geounfold.cli.inputs.points import open_table, read_samples
 from geounfold.cli.inputs.solid import open_solid, source, table_of
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_surface
+from geounfold.io.selection.mixed import box_told, mixed_columns
 from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ class BodyInputs:
         The wireframe that the blocks fill.
     faults : dict
         What `geounfold.unfold` takes on faults.
+    hint : str
+        The columns of rock that vary, if the user chose no rows; else empty.
     """
 
     table: PointTable | PointStream | PartedTable
@@ -62,11 +66,20 @@ class BodyInputs:
     bottom: TriMesh | None
     solid: FilledSolid | None = None
     faults: dict[str, Any] = field(default_factory=dict)
+    hint: str = ""
 
     @property
     def points(self) -> Floats | FilledSolid:
         """What is unfolded: the solid, or the coordinates of the blocks."""
         return self.table.points if self.solid is None else self.solid
+
+    def box_hint(self, summary: Mapping[str, Any]) -> str:
+        """Return the sentence on blocks that fill their lattice's box, if the table tells more."""
+        chosen = isinstance(self.table, PartedTable) or self.solid is not None
+        if chosen or len(self.table.names) <= len(self.table.columns):
+            return ""
+        told = box_told(summary.get("lattice", {}).get("full_box"))
+        return f"{self.table.source}: {told}" if told else ""
 
 
 def read_body(args: Namespace, console: Console) -> BodyInputs:
@@ -100,4 +113,14 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
         None if args.bottom is None else read_surface(args.bottom),
         solid,
         read_faults(args, table),
+        _hint(args, table),
     )
+
+
+def _hint(args: Namespace, table: PointTable | PointStream) -> str:
+    """Return the sentence on columns of rock that vary; empty if the user chose rows."""
+    names = table.names
+    if args.where is not None or args.by is not None or len(set(names)) < len(names):
+        return ""
+    hint = mixed_columns(names, table.categories)
+    return f"{args.points}: {hint}" if hint else ""

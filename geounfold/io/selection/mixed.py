@@ -1,0 +1,95 @@
+"""Columns of a table that tell of rows of other rock: what was taken as one body may be several."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from geounfold.geometry.mesh import Ints
+from geounfold.io.messages import shown
+from geounfold.io.packages.names import plain_name
+from geounfold.io.selection.labels import codes_of
+
+_NAMES = re.compile(
+    r"(?:est|min|geo)?(?:rock|ore|oreflag|domain|dom|lode|vein|seam|reef|zone|orezone|orewaste|"
+    r"orebody|body|litho?|lithology|geol|geology|stratum|strat|formation)"
+    r"(?:type|code|id|no|num|name|flag)?"
+)
+_MOST = 40  # values beyond which a column holds grades or names of samples, not kinds of rock
+_ORE = ("ore", "1", "true", "yes", "y", "min", "mineralised", "mineralized")
+_TOLD = 4  # values that a message names
+
+Categories = Callable[[str], tuple[Ints, list[str]]]
+"""Returns the codes (n,) and the names of a column's values."""
+
+
+def mixed_columns(names: Sequence[str], categories: Categories) -> str:
+    """Return the sentence on columns of rock, ore or domain that vary; empty if none does.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The table's columns.
+    categories : callable
+        Returns a column's values, see `labels.codes_of`.
+    """
+    found = []
+    for name in names:
+        if not _NAMES.fullmatch(plain_name(name)):
+            continue
+        codes, values = categories(name)
+        counts = {v: int(np.count_nonzero(codes == k)) for k, v in enumerate(values)}
+        blank = int(np.count_nonzero(codes < 0))
+        if blank and counts:
+            counts["blank"] = blank
+        if 2 <= len(counts) <= _MOST:
+            found.append((name, counts))
+    if not found:
+        return ""
+    told = " and ".join(f"{shown(name)} ({_counted(counts)})" for name, counts in found)
+    name, counts = found[0]
+    choice = f"{_quoted(name)}={_quoted(_likely(counts))}"
+    verb = "column {} varies" if len(found) == 1 else "columns {} vary"
+    return (
+        f"{verb.format(told)}, and all rows were taken as one body: choose the body's rows by "
+        f'--where "{choice}", or unfold every value on its own by --by {_quoted(name)}'
+    )
+
+
+def mixed_frame(frame: pd.DataFrame) -> str:
+    """Return the sentence of `mixed_columns` for a DataFrame."""
+    names = [str(name) for name in frame.columns]
+    if len(set(names)) < len(names):
+        return ""
+    return mixed_columns(names, lambda name: codes_of([frame.iloc[:, names.index(name)]]))
+
+
+def box_told(sides: Sequence[int] | None) -> str:
+    """Return the sentence on blocks that fill the box of their lattice; empty if they do not."""
+    if sides is None:
+        return ""
+    return (
+        f"the blocks fill the whole box of their lattice ({' x '.join(map(str, sides))}), so that "
+        "no border of a body shows in them; if waste is among them, choose the body's rows by "
+        "--where COLUMN=VALUE"
+    )
+
+
+def _counted(counts: dict[str, int]) -> str:
+    order = sorted(counts, key=lambda value: -counts[value])
+    told = [f"{shown(value)} {counts[value]}" for value in order[:_TOLD]]
+    more = len(order) - _TOLD
+    return ", ".join(told) + (f" and {more} more" if more > 0 else "")
+
+
+def _likely(counts: dict[str, int]) -> str:
+    """Return the value that most probably is the body's: called ore, else the first."""
+    named = [value for value in counts if value != "blank"]
+    return next((value for value in named if value.casefold() in _ORE), named[0])
+
+
+def _quoted(word: str) -> str:
+    return word if re.fullmatch(r"[\w.\-+%]+", word) else f"'{word}'"

@@ -18,7 +18,7 @@ from geounfold.errors import (
     SplitError,
 )
 from geounfold.geometry.measures import face_normals
-from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.geometry.mesh import Bools, Floats, TriMesh
 from geounfold.methods import METHODS, BodyFit, PreparedBody, SurfacePair
 from geounfold.methods.contract import Stage, mean_top_normal
 from geounfold.methods.turned_over import OTHER_SIDE, turned_over
@@ -135,9 +135,8 @@ def _fit_at(
                 shell = body.shell.with_vertices(body.shell.V / merge)
                 hull = solid_hull(shell, cells, float(len(cells) if share is None else share.sum()))
         with stage("split"):
-            parts = split(hull.mesh, options.split)
-            if body.walls is not None:
-                parts = _walled(parts, body.walls.scaled(1 / merge))
+            walls = None if body.walls is None else _walled(hull.mesh, body.walls.scaled(1 / merge))
+            parts = split(hull.mesh, options.split, walls=walls)
     else:
         with stage("split"):
             parts = split_reference(*reference)
@@ -164,10 +163,9 @@ def _fit_at(
     return turned_over(result) if over else result
 
 
-def _walled(parts: SurfaceSplit, walls: FaultWalls) -> SurfaceSplit:
-    """Return a split with the faces at walls as rim."""
-    V, F = parts.mesh.V, parts.mesh.F
-    return replace(parts, rim=parts.rim | walls.at_faces(V[F].mean(axis=1), face_normals(V, F)))
+def _walled(hull: TriMesh, walls: FaultWalls) -> Bools:
+    """Return which faces of a hull are at walls, (m,)."""
+    return walls.at_faces(hull.V[hull.F].mean(axis=1), face_normals(hull.V, hull.F))
 
 
 def top_looks_down(parts: SurfaceSplit, up: Floats) -> bool:

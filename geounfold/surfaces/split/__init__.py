@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from geounfold.errors import OptionError
-from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.geometry.mesh import Bools, Floats, Ints, TriMesh, as_trimesh
 from geounfold.surfaces.split.faces import (
     SAME_WAY,
     Faces,
@@ -42,7 +42,12 @@ Of 106 hulls, half turns two over and twice one, their labels otherwise equal.
 """
 
 
-def split(mesh: TriMesh, method: str = "signed", up: Floats | None = None) -> SurfaceSplit:
+def split(
+    mesh: TriMesh,
+    method: str = "signed",
+    up: Floats | None = None,
+    walls: Bools | None = None,
+) -> SurfaceSplit:
     """Split a closed hull into top, bottom and rim.
 
     Parameters
@@ -55,6 +60,8 @@ def split(mesh: TriMesh, method: str = "signed", up: Floats | None = None) -> Su
         Direction towards the top, in working coordinates.  Decides once for the whole sheet:
         the top is the side whose area-weighted normals look along it.  Default: the frame's
         third axis.
+    walls : (m,) bool, optional
+        Faces at known faults, which are rim and on neither side.
 
     Returns
     -------
@@ -78,12 +85,19 @@ def split(mesh: TriMesh, method: str = "signed", up: Floats | None = None) -> Su
     if method not in SPLITS:
         raise OptionError(f"unknown split '{method}'; valid: {', '.join(SPLITS)}")
     mesh = as_trimesh(mesh)
-    result = SPLITS[method](mesh, _direction(up))
+    if walls is None or method != "signed":
+        result = SPLITS[method](mesh, _direction(up))
+    else:
+        result = split_signed(mesh, _direction(up), walls)
+    if walls is not None:
+        result = replace(result, rim=result.rim | walls)
     check_sheet(result)
     return result
 
 
-def split_signed(mesh: TriMesh, up: Floats | None = None) -> SurfaceSplit:
+def split_signed(
+    mesh: TriMesh, up: Floats | None = None, walls: Bools | None = None
+) -> SurfaceSplit:
     """Split by the lowest eigenvector of the signed Laplacian of the face graph.
 
     Neighbours i, j pull to the same sign with weight ``exp((N_i.N_j - 1) / 0.05) + 0.001``
@@ -101,7 +115,7 @@ def split_signed(mesh: TriMesh, up: Floats | None = None) -> SurfaceSplit:
     """
     faces = measure_faces(mesh)
     L = signed_laplacian(faces)
-    pair, candidates = sheet_pair(faces, L)
+    pair, candidates = sheet_pair(faces, L, walls)
     faces = replace(faces, median=pair.thickness, other=pair.others)
     result = _result(mesh, faces, signs(continued_sides(L, pair)), up)
     return replace(result, candidates=candidates)

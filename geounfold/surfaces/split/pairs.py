@@ -81,9 +81,14 @@ class Pair:
     others: Bools
 
 
-def sheet_pair(faces: Faces, L: sp.csc_array) -> tuple[Pair, tuple[Candidate, ...]]:
-    """Return the pair of opposite sides that is taken, and all candidates in order."""
-    rank = _families(faces)
+def sheet_pair(
+    faces: Faces, L: sp.csc_array, walls: Bools | None = None
+) -> tuple[Pair, tuple[Candidate, ...]]:
+    """Return the pair of opposite sides that is taken, and all candidates in order.
+
+    Faces at ``walls`` (m,), known faults, belong to no pair.
+    """
+    rank = _families(faces, walls)
     count = int(rank.max()) + 1
     pairs = [_pair(name, rank, k, faces, L) for k, name in enumerate(CANDIDATES[:count])]
     pairs = pairs or [_whole(faces, L)]
@@ -91,7 +96,7 @@ def sheet_pair(faces: Faces, L: sp.csc_array) -> tuple[Pair, tuple[Candidate, ..
     return taken, tuple(replace(p.candidate, taken=p is taken) for p in pairs)
 
 
-def _families(faces: Faces) -> Ints:
+def _families(faces: Faces, walls: Bools | None = None) -> Ints:
     """Return the pair of sides to which each face belongs, (m,): 0 the largest, -1 for none.
 
     Faces beside a ridge, and those without an opposite one, belong to none; others are joined
@@ -100,6 +105,8 @@ def _families(faces: Faces) -> Ints:
     N, near = faces.smoothed, faces.adjacency
     back = np.where(faces.hit >= 0, -np.einsum("ij,ij->i", N, N[faces.hit]), 0.0)
     good = (back > LOOKS_BACK) & ~ridges(faces, N, RIDGE_COSINE).any(axis=1)
+    if walls is not None:
+        good &= ~walls
     own = np.arange(len(N))
     row = np.concatenate([np.repeat(own, 3), own[good]])
     column = np.concatenate([near.ravel(), faces.hit[good]])

@@ -14,12 +14,13 @@ from geounfold.body.prepare import BodyPoints, Cells
 from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError
 from geounfold.faults.block_map import BlockMap, Pose, posed
+from geounfold.faults.consistent import consistent_poses
 from geounfold.faults.cutoffs import cutoff, refined
 from geounfold.faults.cutting import CRUMB, FaultCut, cut_blocks
 from geounfold.faults.given import MOST, FaultsGiven
 from geounfold.faults.joints import Joint, facing, first_poses
 from geounfold.faults.outline import Outlines
-from geounfold.faults.poses import PoseRules, solve_poses, view
+from geounfold.faults.poses import PoseRules, view
 from geounfold.faults.result import FaultedBody, FaultFit
 from geounfold.faults.settled import along_sd, settled_by
 from geounfold.faults.slips import slips_of
@@ -140,7 +141,8 @@ class Faulting:
             view(j, blocks, up, self.given.direction(j.surface.name, frame), outlines)
             for j in joints
         ]
-        found = solve_poses(blocks, views, poses, groups)
+        found, left_out = consistent_poses(blocks, views, poses, groups, frame)
+        self.notes += left_out
         poses = _groups_apart(blocks, found.poses, groups)
         self._tell_groups(groups)
         faults = [
@@ -153,7 +155,7 @@ class Faulting:
                 resolved_by=settled_by(v, poses, PoseRules()),
                 along_sd=along_sd(v, poses, found.covariance),
             )
-            for v in views
+            for v in found.views
         ]
         body = FaultedBody(
             cells=self.cells(),

@@ -36,7 +36,8 @@ def consistent_poses(
     frame : Frame
         The working frame.
     """
-    found, left_out = solve_poses(blocks, views, poses, groups), []
+    found = solve_poses(blocks, views, poses, groups)
+    left_out: list[str] = []
     while True:
         misfit = _misfits(found, blocks, frame)
         worst = int(misfit.argmax()) if len(misfit) else -1

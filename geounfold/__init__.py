@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from geounfold.comparison.crosscheck import CrossCheck, crosscheck
     from geounfold.comparison.flatteners import compare
     from geounfold.drillholes import DrillHoles, read_drillholes
-    from geounfold.errors import GeounfoldError, InputError
+    from geounfold.errors import GeounfoldError, InputError, NotFittedError, OptionError
     from geounfold.estimation import (
         Estimation,
         Neighbourhood,
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
     from geounfold.unfolding.run import unfold
     from geounfold.unfolding.sklearn_unfolder import Unfolder
 
+logging.getLogger(__name__).addHandler(logging.NullHandler())
+
 _HOMES = {
     "BlockModel": "body.block_model",
     "ModelFrame": "body.model_frame",
@@ -67,6 +70,8 @@ _HOMES = {
     "fill": "io.solids",
     "GeounfoldError": "errors",
     "InputError": "errors",
+    "NotFittedError": "errors",
+    "OptionError": "errors",
     "Estimation": "estimation",
     "Neighbourhood": "estimation",
     "Variogram": "estimation",
@@ -113,6 +118,8 @@ __all__ = [
     "InputError",
     "ModelFrame",
     "Neighbourhood",
+    "NotFittedError",
+    "OptionError",
     "TetMesh",
     "TriMesh",
     "UnfoldOptions",
@@ -158,5 +165,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the public names."""
-    return sorted({*globals(), *_HOMES})
+    """List the public names, and no others."""
+    return sorted(__all__)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any
 
@@ -18,14 +19,21 @@ class GeounfoldError(Exception):
     exit_status = 1
 
 
-class InputError(GeounfoldError):
-    """The points, tables or files given cannot be used: what, where, what to do."""
+class InputError(GeounfoldError, ValueError):
+    """The points, tables or files given cannot be used: what, where, what to do.
+
+    It is a ValueError too, as other libraries raise for values that do not fit.
+    """
 
     exit_status = 2
 
 
 class OptionError(InputError):
     """An option has a value outside its valid ones, which the message lists."""
+
+
+class NotFittedError(InputError, AttributeError):
+    """An `Unfolder` was used before it was fitted; scikit-learn's error of that name too."""
 
 
 class OutputError(InputError):
@@ -159,7 +167,21 @@ def check_one_of(name: str, value: object, valid: Iterable[str], *, none: bool =
         return
     words = tuple(valid)
     if not (isinstance(value, str) and value in words):
-        raise _refusal(name, f"one of {', '.join(words)}", value, none)
+        error = _refusal(name, f"one of {', '.join(words)}", value, none)
+        raise OptionError(f"{error}{nearest(value, words)}")
+
+
+def nearest(name: object, valid: Iterable[str]) -> str:
+    """Return the question for the valid name that looks most like a wrong one; empty if none does.
+
+    Examples
+    --------
+    >>> nearest("flatener", ("flattener", "hull"))
+    " (did you mean 'flattener'?)"
+    """
+    words = {word.casefold(): word for word in valid}
+    found = get_close_matches(str(name).casefold(), words, n=1)
+    return f" (did you mean '{words[found[0]]}'?)" if found else ""
 
 
 def check_flag(name: str, value: object) -> None:

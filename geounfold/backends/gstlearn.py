@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from geounfold.errors import BackendError, MissingDependencyError
+from geounfold.errors import BackendError, InputError, MissingDependencyError
 from geounfold.geometry.mesh import Floats, Ints
 
 ISLANDS = 16
@@ -45,6 +45,57 @@ def library() -> ModuleType:
         ) from error
     found: ModuleType = gstlearn
     return found
+
+
+def model_of(nugget: float, structures: Sequence[Part], axes: Floats) -> Any:
+    """Return a gstlearn Model of structures whose ranges lie along axes (rows of (3, 3))."""
+    gl = library()
+    angles = _angles(axes)
+    return _model(gl, _space(gl), nugget, structures, None, angles)
+
+
+def parts_of(model: Any) -> tuple[float, list[Part], Floats]:
+    """Return the nugget, the structures and the axes (3, 3) of a gstlearn Model.
+
+    Raises
+    ------
+    InputError
+        The model has several variables or dimensions other than three, structures of a kind that
+        geounfold does not have, or structures that are turned differently.
+    """
+    if model.getNVar() != 1 or model.getNDim() != 3:
+        raise InputError("the gstlearn model must have one variable and three dimensions")
+    nugget, turns = 0.0, []
+    parts: list[Part] = []
+    for number in range(model.getNCov()):
+        part = model.getCovAniso(number)
+        key, sill = part.getType().getKey(), float(part.getSill(0, 0))
+        if key == "NUGGET":
+            nugget += sill
+            continue
+        kind = next((k for k, name in _KINDS.items() if name == key), None)
+        if kind is None:
+            raise InputError(
+                f"gstlearn's {key} has no counterpart; geounfold has {', '.join(_KINDS.values())}"
+            )
+        ranges = tuple(float(r) for r in part.getRanges())
+        parts.append((kind, sill, ranges))
+        if len(set(ranges)) > 1:
+            turns.append(np.asarray(part.getAnisoRotMat().toTL(), dtype=np.float64).T)
+    axes = turns[0] if turns else np.eye(3)
+    if not all(np.allclose(turn, axes, atol=1e-9) for turn in turns):
+        raise InputError("the gstlearn model's structures are turned differently")
+    return nugget, parts, axes
+
+
+def _angles(axes: Floats) -> list[float]:
+    """Return gstlearn's angles, degrees: axes are the columns of Rz(a) Ry(b) Rx(c)."""
+    R = axes.T
+    b = float(np.degrees(-np.arcsin(np.clip(R[2, 0], -1, 1))))
+    if np.isclose(abs(R[2, 0]), 1):  # a and c turn about one axis: all of it is a's
+        return [float(np.degrees(np.arctan2(-R[0, 1], R[1, 1]))), b, 0.0]
+    a, c = np.arctan2(R[1, 0], R[0, 0]), np.arctan2(R[2, 1], R[2, 2])
+    return [float(np.degrees(a)), b, float(np.degrees(c))]
 
 
 def krige(
@@ -128,7 +179,12 @@ def _space(gl: ModuleType) -> Any:
 
 
 def _model(
-    gl: ModuleType, space: Any, nugget: float, structures: Sequence[Part], mean: float | None
+    gl: ModuleType,
+    space: Any,
+    nugget: float,
+    structures: Sequence[Part],
+    mean: float | None,
+    angles: Sequence[float] = (),
 ) -> Any:
     parts = [(_KINDS[kind], sill, list(ranges)) for kind, sill, ranges in structures]
     if nugget > 0 or not parts:
@@ -136,10 +192,11 @@ def _model(
     name, sill, ranges = parts[0]
     kind = getattr(gl.ECov, name)
     model = gl.Model.createFromParam(
-        kind, 1.0, sill, 1.0, ranges, gl.MatrixSymmetric(), [], space, True
+        kind, 1.0, sill, 1.0, ranges, gl.MatrixSymmetric(), list(angles), space, True
     )
     for name, sill, ranges in parts[1:]:
-        model.addCovFromParam(getattr(gl.ECov, name), 1.0, sill, 1.0, ranges)
+        turned = (gl.MatrixSymmetric(), list(angles)) if angles else ()
+        model.addCovFromParam(getattr(gl.ECov, name), 1.0, sill, 1.0, ranges, *turned)
     if mean is None:
         model.setDriftIRF(0)
     else:

@@ -11,6 +11,7 @@ import numpy as np
 
 from geounfold.errors import OptionError
 from geounfold.geometry.mesh import Floats
+from geounfold.geometry.rotations import angles_of
 from geounfold.geometry.rotations import rotation_from_angles as turned
 
 KINDS = ("spherical", "exponential", "gaussian")
@@ -140,6 +141,67 @@ class Variogram:
         for s in self.structures:
             left += s.sill * correlation(s.kind, np.linalg.norm(h / s.ranges, axis=1))
         return np.where((h == 0).all(axis=1), 0.0, self.sill - left)
+
+    def to_gstlearn(self) -> Any:
+        """Return the model as gstlearn's Model, with an unknown constant mean.
+
+        Raises
+        ------
+        MissingDependencyError
+            gstlearn is not installed.
+        """
+        from geounfold.backends import gstlearn
+
+        return gstlearn.model_of(self.nugget, self._parts, self.axes)
+
+    @classmethod
+    def from_gstlearn(cls, model: Any) -> Variogram:
+        """Return a gstlearn Model of one variable in three dimensions.
+
+        Raises
+        ------
+        InputError
+            A structure is not spherical, exponential or gaussian, or turned differently.
+        """
+        from geounfold.backends import gstlearn
+
+        return cls._of(*gstlearn.parts_of(model))
+
+    def to_gstools(self) -> Any:
+        """Return the model as GSTools' CovModel, of several structures as a SumModel.
+
+        Raises
+        ------
+        OptionError
+            The ranges of the structures are not in proportion, which a SumModel cannot have.
+        MissingDependencyError
+            GSTools is not installed.
+        """
+        from geounfold.backends import gstools
+
+        return gstools.model_of(self.nugget, self._parts, self.axes)
+
+    @classmethod
+    def from_gstools(cls, model: Any) -> Variogram:
+        """Return a GSTools model in three dimensions: a CovModel or a SumModel.
+
+        Raises
+        ------
+        InputError
+            A structure is not spherical, exponential or gaussian.
+        """
+        from geounfold.backends import gstools
+
+        return cls._of(*gstools.parts_of(model))
+
+    @property
+    def _parts(self) -> list[tuple[str, float, Triple]]:
+        return [(s.kind, s.sill, s.ranges) for s in self.structures]
+
+    @classmethod
+    def _of(cls, nugget: float, parts: Any, axes: Floats) -> Variogram:
+        structures = tuple(Structure(kind, sill, tuple(ranges)) for kind, sill, ranges in parts)
+        return cls(nugget, structures, angles_of(axes))
 
     def facts(self) -> dict[str, Any]:
         """Return the model in the form that `from_facts` reads."""

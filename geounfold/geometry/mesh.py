@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeVar
+from inspect import signature
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,10 @@ class TriMesh:
         object.__setattr__(self, "V", V)
         object.__setattr__(self, "F", F)
 
+    def __repr__(self) -> str:
+        """Return one line: vertices and triangles."""
+        return f"<TriMesh of {len(self.V)} vertices, {len(self.F)} triangles>"
+
     def with_vertices(self, vertices: Floats) -> TriMesh:
         """Return the same faces over other vertices, (n, 3) or (n, 2)."""
         return TriMesh(vertices, self.F)
@@ -150,6 +155,10 @@ class TetMesh:
         object.__setattr__(self, "V", V)
         object.__setattr__(self, "T", T)
 
+    def __repr__(self) -> str:
+        """Return one line: vertices and tetrahedra."""
+        return f"<TetMesh of {len(self.V)} vertices, {len(self.T)} tetrahedra>"
+
     def with_vertices(self, vertices: Floats) -> TetMesh:
         """Return the same tetrahedra over other vertices, (n, 3)."""
         return TetMesh(vertices, self.T)
@@ -163,6 +172,20 @@ class TetMesh:
         return pyvista.UnstructuredGrid(cells, kinds, self.V.copy())
 
 
-def as_trimesh(mesh: TriMesh | tuple[Floats, Ints]) -> TriMesh:
-    """Return a TriMesh from a TriMesh or a (V, F) pair."""
-    return mesh if isinstance(mesh, TriMesh) else TriMesh(*mesh)
+def as_trimesh(mesh: Any) -> TriMesh:
+    """Return a TriMesh from a TriMesh, a (V, F) pair, or pyvista's surface or cells.
+
+    Polygons are cut into triangles; of cells the outer faces are taken.
+    """
+    if isinstance(mesh, TriMesh):
+        return mesh
+    if hasattr(mesh, "extract_surface"):
+        surface = (mesh if hasattr(mesh, "regular_faces") else _skin(mesh)).triangulate()
+        return TriMesh(np.asarray(surface.points, np.float64), surface.regular_faces)
+    return TriMesh(*mesh)
+
+
+def _skin(cells: Any) -> Any:
+    """Return the outer faces of pyvista's cells; newer versions want the algorithm named."""
+    named = "algorithm" in signature(cells.extract_surface).parameters
+    return cells.extract_surface(algorithm=None) if named else cells.extract_surface()

@@ -92,3 +92,21 @@ def rotation_from_angles(bearing: float, plunge: float, dip: float) -> Floats:
     roll = np.array([[c, 0.0, -sc], [0.0, 1.0, 0.0], [sc, 0.0, c]])
     out: Floats = roll @ tip @ turn
     return out
+
+
+def angles_of(axes: Floats) -> tuple[float, float, float]:
+    """Return the bearing, plunge and dip, degrees, of axes (3, 3): see `rotation_from_angles`.
+
+    If the y axis is vertical, bearing and dip turn about one axis, and the dip is 0.
+
+    Examples
+    --------
+    >>> [round(angle, 9) for angle in angles_of(rotation_from_angles(30, 20, 10))]
+    [30.0, 20.0, 10.0]
+    """
+    plunge = float(np.degrees(-np.arcsin(np.clip(axes[1, 2], -1, 1))))
+    if np.isclose(abs(axes[1, 2]), 1):
+        return float(np.degrees(np.arctan2(-axes[0, 1], axes[0, 0]))), plunge, 0.0
+    bearing = float(np.degrees(np.arctan2(axes[1, 0], axes[1, 1])))
+    dip = float(np.degrees(np.arctan2(-axes[0, 2], axes[2, 2])))
+    return bearing, plunge, dip

@@ -46,6 +46,8 @@ def existing_file(path: Path) -> Path:
         with path.open("rb") as stream:
             if not stream.read(1):
                 raise InputError(f"{path}: the file is empty")
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{shown(path)}: cannot be read: {reason}") from error

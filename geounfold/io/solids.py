@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from inspect import signature
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from geounfold.body.fill import FilledSolid, fill_between, fill_solid
 from geounfold.errors import OptionError
@@ -79,17 +76,7 @@ def surface_of(given: SurfaceLike, element: str | None = None) -> TriMesh:
     """Return a surface as a TriMesh: from a file, (V, F), or a pyvista.PolyData."""
     if isinstance(given, str | Path):
         return read_surface(given, element)
-    if hasattr(given, "extract_surface"):
-        surface = given if hasattr(given, "regular_faces") else _skin(given)
-        faces = surface.triangulate()
-        return TriMesh(np.asarray(faces.points, np.float64), np.asarray(faces.regular_faces))
     return as_trimesh(given)
-
-
-def _skin(cells: Any) -> Any:
-    """Return the surface of pyvista's cells; newer versions want their algorithm named."""
-    named = "algorithm" in signature(cells.extract_surface).parameters
-    return cells.extract_surface(algorithm=None) if named else cells.extract_surface()
 
 
 def is_wireframe(path: str | Path, element: str | None = None) -> bool:

@@ -33,6 +33,10 @@ class ControlMesh:
     unfolded: TetMesh
     stratigraphic: Floats
 
+    def __repr__(self) -> str:
+        """Return one line: vertices and tetrahedra."""
+        return f"<ControlMesh of {len(self.folded.V)} vertices, {len(self.folded.T)} tetrahedra>"
+
     def to_pyvista(self, space: Space = "folded") -> pyvista.UnstructuredGrid:
         """Return the tetrahedra in one space for pyvista.
 

@@ -95,6 +95,14 @@ class UnfoldingMap:
         self.body = body
         self._known = tuple(known)
 
+    def __repr__(self) -> str:
+        """Return one line: the control mesh, its coordinates and its reach."""
+        unit = self.frame.scale
+        return (
+            f"<UnfoldingMap of {len(self.control.folded.T)} tetrahedra by {self.coordinates} "
+            f"coordinates, blocks of {unit:.4g}, reach {self.reach * unit:.4g}>"
+        )
+
     @cached_property
     def _folded(self) -> MeshSpace | PartsSpace:
         shell = None if self.shell is None else self.shell.folded

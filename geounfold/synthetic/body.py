@@ -240,6 +240,11 @@ class Body:
     sizes: Floats
     sheet: Sheet
 
+    def __repr__(self) -> str:
+        """Return one line: the case and its blocks."""
+        sides = " x ".join(f"{s:.4g}" for s in self.steps)
+        return f"<Body {self.name} of {len(self.folded)} blocks of {sides}>"
+
     def __iter__(self) -> Iterator[Floats]:
         """Unpack as ``X, W``: the folded points and their truth."""
         return iter((self.folded, self.truth))

@@ -14,6 +14,7 @@ from geounfold.errors import (
     check_one_of,
     check_options,
     check_whole,
+    nearest,
 )
 from geounfold.flattening import FLATTENERS, check_flattener_options
 from geounfold.mapping.control_mesh import DATUMS
@@ -183,7 +184,8 @@ def check_names(values: Mapping[str, Any], kind: Any, path: tuple[str, ...] = ()
             inside = f" in {'.'.join(path)}" if path else ""
             raise OptionError(
                 gone(full, value)
-                or f"there is no option {full}; valid{inside}: {', '.join(known) or 'none'}"
+                or f"there is no option {full}{nearest(name, known)}; "
+                f"valid{inside}: {', '.join(known) or 'none'}"
             )
 
 

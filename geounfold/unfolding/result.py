@@ -271,21 +271,38 @@ class Unfolding:
 
         return map_partitions(self.map, frame)
 
-    def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
-        """Return the points in one space with all columns, the other space as an array.
+    def to_pyvista(
+        self, space: Space = "folded", *, cells: bool = False
+    ) -> pyvista.PolyData | pyvista.UnstructuredGrid:
+        """Return the points, or the blocks as cells, in one space with all columns.
 
         Parameters
         ----------
         space : {"folded", "unfolded"}
-            Space of the points; the point data of the other space's name, (n, 3), holds their
-            places there.  Unfolded, points without an image (location outside) are left out.
+            Space of the points; the data of the other space's name, (n, 3), hold their places
+            there.  Unfolded, points without an image (location outside) are left out.
+        cells : bool
+            True for a hexahedron for each block: its sides are those of the DataFrame's columns
+            (dx, XINC, ...), or of the lattice, and its corners are carried by the map.  A block
+            with a corner beyond the map's reach keeps its sides about its unfolded centre.
+
+        Raises
+        ------
+        InputError
+            The blocks' sides are not known.
         """
-        from geounfold.io.formats.vtk import cloud
+        from geounfold.io.formats.vtk import cloud, hexahedra
 
         here, there, other = in_space(space, self.folded, self.points)
         keep = np.isfinite(here).all(axis=1)
-        table = self.table if self.chosen is None else self.table.loc[self.chosen]
+        table = self.table if self.chosen is None else self.table[self.chosen]
         columns = {str(name): _plain_column(c)[keep] for name, c in table.items()}
+        if cells:
+            from geounfold.unfolding.block_corners import block_corners
+
+            made = hexahedra(block_corners(self, space, table)[keep], columns)
+            made.cell_data[other] = there[keep]
+            return made
         made = cloud(here[keep], columns)
         made.point_data[other] = there[keep]
         return made

@@ -37,7 +37,7 @@ from geounfold.unfolding.checks import check_faulted, check_method, check_single
 from geounfold.unfolding.fit_blocks import fit_blocks
 from geounfold.unfolding.fit_body import fit
 from geounfold.unfolding.measured import measure
-from geounfold.unfolding.options import UnfoldOptions
+from geounfold.unfolding.options import UnfoldOptions, check_names
 from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.summary import RunRecord
 
@@ -148,6 +148,7 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     >>> u.points.shape == body.folded.shape
     True
     """
+    check_names(changes, UnfoldOptions)
     chosen = replace(options or UnfoldOptions(), **changes)
     check_method(chosen)
     solid: FilledSolid | None = None

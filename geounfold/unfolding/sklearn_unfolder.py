@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
+from inspect import Parameter, Signature
 from typing import Any, overload
 
 import numpy as np
 import pandas as pd
 
-from geounfold.errors import InputError, OptionError
+from geounfold.errors import InputError, NotFittedError, OptionError, nearest
 from geounfold.geometry.mesh import Floats
 from geounfold.io.result_columns import FOLDED, UNFOLDED
 from geounfold.unfolding.options import UnfoldOptions
@@ -16,6 +18,28 @@ from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.run import unfold
 
 _NAMES = tuple(field.name for field in fields(UnfoldOptions))
+
+
+def _check_dense(X: Any) -> None:
+    """Raise InputError for input that no body can be: sparse, complex, or not a table of three."""
+    if hasattr(X, "toarray"):
+        raise InputError("sparse input is not supported: give an array of (n, 3) coordinates")
+    array = np.asarray(X)
+    if np.iscomplexobj(array):
+        raise InputError("Complex data not supported: coordinates are real numbers")
+    if array.ndim == 2 and array.shape[1] != 3:
+        raise InputError(
+            f"points must have shape (n, 3), but have {array.shape[1]} feature(s) "
+            f"(shape={array.shape}) while a minimum of 3 is required"
+        )
+
+
+def _not_fitted() -> type[NotFittedError]:
+    """Return the error of an Unfolder that was not fitted; scikit-learn's too if it is loaded."""
+    loaded = sys.modules.get("sklearn.exceptions")
+    if loaded is None:
+        return NotFittedError
+    return type("NotFittedError", (NotFittedError, loaded.NotFittedError), {})
 
 
 class Unfolder:
@@ -62,7 +86,9 @@ class Unfolder:
     def _take(self, options: dict[str, Any]) -> None:
         for name, value in options.items():
             if name not in _NAMES:
-                raise OptionError(f"there is no option {name}; valid: {', '.join(_NAMES)}")
+                raise OptionError(
+                    f"there is no option {name}{nearest(name, _NAMES)}; valid: {', '.join(_NAMES)}"
+                )
             setattr(self, name, value)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -84,8 +110,9 @@ class Unfolder:
         y : any
             Not looked at.
         """
+        _check_dense(X)
         self.unfolding_ = unfold(X, UnfoldOptions(**self.get_params()))
-        self.n_features_in_ = np.shape(X)[1]
+        self.n_features_in_ = np.asarray(X).shape[1]
         return self
 
     @overload
@@ -132,7 +159,7 @@ class Unfolder:
 
     def _fitted(self) -> Unfolding:
         if not self.__sklearn_is_fitted__():
-            raise InputError("this Unfolder has unfolded nothing yet: call fit first")
+            raise _not_fitted()("this Unfolder has unfolded nothing yet: call fit first")
         return self.unfolding_
 
     def __sklearn_is_fitted__(self) -> bool:
@@ -153,3 +180,15 @@ class Unfolder:
         defaults = UnfoldOptions()
         changed = {n: v for n, v in self.get_params().items() if v != getattr(defaults, n)}
         return f"Unfolder({', '.join(f'{name}={value!r}' for name, value in changed.items())})"
+
+
+# What the options are, for tools that read signatures: completion, and scikit-learn's checks.
+Unfolder.__init__.__signature__ = Signature(  # type: ignore[attr-defined]
+    [
+        Parameter("self", Parameter.POSITIONAL_OR_KEYWORD),
+        *(
+            Parameter(name, Parameter.KEYWORD_ONLY, default=getattr(UnfoldOptions(), name))
+            for name in _NAMES
+        ),
+    ]
+)

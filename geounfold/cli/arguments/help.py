@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from geounfold.errors import OptionError
+from geounfold.errors import OptionError, nearest
+
+_UNKNOWN = re.compile(r"unrecognized arguments: .*?(--[\w-]+)|COMMAND: invalid choice: '([^']*)'")
 
 EXIT_STATUS = "exit status: 0 done, 2 wrong input or option, 1 other failure, 130 interrupted"
 
@@ -67,8 +70,20 @@ class Parser(argparse.ArgumentParser):
         self._print_message(self.format_help(full=full), file or sys.stdout)
 
     def error(self, message: str) -> NoReturn:
-        """Raise OptionError."""
+        """Raise OptionError; an unknown flag or command gets the nearest valid one."""
+        unknown = _UNKNOWN.search(message)
+        if unknown is not None:
+            flag, command = unknown.groups()
+            valid = (
+                self._flags() if flag else list(self._commands.choices if self._commands else ())
+            )
+            message = f"{message.partition(' (choose')[0]}{nearest(flag or command, valid)}"
         raise OptionError(f"{message} (see '{self.prog} --help')")
+
+    def _flags(self) -> list[str]:
+        """Return the long flags of this parser and of its commands."""
+        parsers = [self, *(self._commands.choices.values() if self._commands else ())]
+        return [f for p in parsers for a in p._actions for f in a.option_strings if f[:2] == "--"]
 
     def _short_usage(self) -> str:
         """Return the usage with what is needed; "[options]" replaces the others."""

@@ -75,6 +75,22 @@ def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
     return mesh
 
 
+def hexahedra(corners: Floats, data: Mapping[str, np.ndarray]) -> Any:
+    """Return cells of eight corners each, (n, 8, 3), and their values as a pyvista grid."""
+    import pyvista
+
+    n = len(corners)
+    cells = np.column_stack([np.full(n, 8), np.arange(8 * n).reshape(n, 8)]).ravel()
+    kinds = np.full(n, pyvista.CellType.HEXAHEDRON)
+    grid: Any = pyvista.UnstructuredGrid(cells, kinds, np.ascontiguousarray(corners.reshape(-1, 3)))
+    for name, values in data.items():
+        if values.dtype == object:
+            add_text(grid.GetCellData(), name, values)
+        else:
+            grid.cell_data[name] = values
+    return grid
+
+
 def read_surface(path: Path) -> Surface:
     """Return a poly data file's faces; polygons are cut into triangles."""
     import pyvista

@@ -51,6 +51,13 @@ class Hull:
     even: bool = False
     reason: str = ""
 
+    def __repr__(self) -> str:
+        """Return one line: the method, faces, and both volumes in blocks."""
+        return (
+            f"<Hull by {self.method} of {len(self.mesh.F)} faces: volume {self.volume:.6g} for "
+            f"{self.blocks_volume:.6g} blocks>"
+        )
+
     def scaled(self, factor: float) -> Hull:
         """Return the hull in another unit: lengths times a factor."""
         return replace(

@@ -94,6 +94,8 @@ def _damage_reported(path: Path) -> Iterator[None]:
     """Raise InputError for every error to which a damaged file leads while it is read."""
     try:
         yield
+    except InputError:
+        raise
     except OSError as error:
         # An error of the disk has a number. Broken gzip or Parquet has none, and a position before
         # the file's beginning, to which a wrong number leads, gives EINVAL.

@@ -15,8 +15,9 @@ from geounfold.comparison.names import flattener_names
 from geounfold.errors import GeounfoldError, OptionError
 from geounfold.flattening import Flattening, flatten, measures
 from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.unfolding.clock import Progress
 from geounfold.unfolding.options import UnfoldOptions
-from geounfold.unfolding.run import Progress, unfold
+from geounfold.unfolding.run import unfold
 
 Surface = TriMesh | tuple[Floats, Ints]
 

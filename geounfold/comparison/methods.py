@@ -21,9 +21,10 @@ from geounfold.mapping.carried import checked_points
 from geounfold.methods import METHODS, SurfacePair
 from geounfold.quality.neighbour_distances import NEIGHBOURS, epsilon
 from geounfold.quality.truth import aligned_rms
+from geounfold.unfolding.clock import Progress
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.result import Unfolding
-from geounfold.unfolding.run import Progress, unfold
+from geounfold.unfolding.run import unfold
 
 Blocks = Floats | pd.DataFrame | KnownBody
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping
+import logging
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import wraps
@@ -21,7 +21,7 @@ from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError
 from geounfold.faults.given import FaultsGiven, Surfaces, block_column
 from geounfold.faults.rejoin import Faulting
-from geounfold.geometry.mesh import Floats, TriMesh, as_trimesh
+from geounfold.geometry.mesh import Bools, Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
 from geounfold.io.selection import read_where
 from geounfold.io.selection.mixed import mixed_frame
@@ -34,33 +34,15 @@ from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.parts_space import MapParts
 from geounfold.methods import METHODS, BodyFit, PointwiseMap
 from geounfold.unfolding.checks import check_faulted, check_method, check_single
+from geounfold.unfolding.clock import Clock, Progress
 from geounfold.unfolding.fit_blocks import fit_blocks
 from geounfold.unfolding.fit_body import fit
 from geounfold.unfolding.measured import measure
 from geounfold.unfolding.options import UnfoldOptions, check_names
 from geounfold.unfolding.result import Unfolding
-from geounfold.unfolding.summary import RunRecord
+from geounfold.unfolding.summary import RunRecord, warnings_of
 
-Progress = Callable[[str], None]
-
-
-class _Clock:
-    """Seconds per stage, with the stages' names shown as they start."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self.seconds: dict[str, float] = {}
-        self._progress = progress
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        if self._progress is not None:
-            self._progress(name)
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            taken = time.perf_counter() - start
-            self.seconds[name] = self.seconds.get(name, 0.0) + taken
+_log = logging.getLogger("geounfold")
 
 
 def _hinting(run: Callable[..., Unfolding]) -> Callable[..., Unfolding]:
@@ -120,7 +102,8 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         ``ore`` if the rims are the ore's own, whose ends at a fault mark its slip; ``model`` if
         the block model was cut off there.
     progress : callable, optional
-        Called with every stage's name as it starts.
+        Called with every stage's name as it begins.  If it takes two arguments, it also gets the
+        share of the run that is done, 0 to 1, and is called inside long stages too.
     where : str, optional
         Chooses rows of a DataFrame, such as ``"ROCK=ORE and AU>0.2"``; see the command line's
         ``--where``. The body is those rows alone; ``Unfolding.table`` has all rows, the others
@@ -162,14 +145,14 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
             raise InputError("where chooses rows by columns: give a DataFrame")
         rows = chosen_rows(read_where(where), given, "the table")
         points = given.loc[rows]
-    clock = _Clock(progress)
+    clock = Clock(progress)
     with clock.stage("frame"):
         place = _coordinates(points)
         blocks = block_column(fault_blocks, given, rows)
         found = FaultsGiven.of(faults, blocks, slip_direction, outline, len(place))
     if found is not None:
         check_faulted(chosen, given=top is not None or bottom is not None)
-        return Unfolding(_faulted(place, Faulting(found), chosen, clock), given, rows)
+        return _finished(_faulted(place, Faulting(found), chosen, clock), given, rows, clock)
     with clock.stage("frame"):
         divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
         prepared, bodies = prepare(place, chosen.body, parts=divide)
@@ -179,6 +162,7 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         bodies = with_shells(bodies, prepared, solid.shell)
     fits = []
     for part, body in enumerate(bodies):
+        clock.body(part, len(bodies))
         with _named(prepared.division, part):
             fits.append(fit(body, prepared.frame, chosen, reference, clock.stage))
     del bodies  # as large as the points, and not needed any more
@@ -186,12 +170,20 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         mapping = _one_map(fits, prepared, chosen)
     measured = measure(mapping, prepared, fits, chosen, clock.stage)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
+    return _finished(record, given, rows, clock)
+
+
+def _finished(
+    record: RunRecord, given: pd.DataFrame | None, rows: Bools | None, clock: Clock
+) -> Unfolding:
+    """Return the result of a run, with its warnings logged."""
+    for warning in warnings_of(record):
+        _log.warning("%s", warning)
+    clock.over()
     return Unfolding(record, given, rows)
 
 
-def _faulted(
-    points: Floats, faulting: Faulting, options: UnfoldOptions, clock: _Clock
-) -> RunRecord:
+def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: Clock) -> RunRecord:
     """Return the run of a body cut into fault blocks, which are unfolded and joined."""
     with clock.stage("faults"):
         prepared, bodies = prepare(points, cut=faulting.cut)

@@ -23,7 +23,7 @@ from geounfold.cli import main
 from geounfold.cli.commands import doctor
 from geounfold.cli.terminal import progress
 from geounfold.cli.terminal.console import Console
-from geounfold.cli.terminal.time_left import SHARES, Forecast
+from geounfold.cli.terminal.time_left import Forecast
 from geounfold.errors import MissingDependencyError
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.options_toml import to_toml
@@ -210,44 +210,38 @@ def test_the_file_is_an_input_and_for_bodies_only(
 # -------------------------------------------------------------------------------------- progress
 
 
-def test_time_left_follows_the_stages() -> None:
+def test_time_left_follows_the_share_that_is_told() -> None:
     now = [100.0]
     forecast = Forecast(lambda: now[0])
-    assert sum(SHARES.values()) == pytest.approx(1.0)
-    forecast.begin("reading p.csv")
+    forecast.tell(None)  # reading is no part of the run
+    now[0] += 5.0
+    forecast.tell(0.0)
     assert (forecast.done, forecast.left) == (None, None)
-    now[0] += 5.0  # reading does not count
-    forecast.begin("frame")
     now[0] += 2.0
-    assert forecast.left is None
-    forecast.begin("hull")
-    # The frame's share, 0.1, took 2 s, so the whole takes 20 s, 18 s of which are left.
+    forecast.tell(0.1)
+    # A tenth took 2 s, so the whole takes 20 s, 18 s of which are left.
     assert forecast.left == pytest.approx(18.0)
     assert forecast.done == pytest.approx(0.10)
-    now[0] += 1.3  # half of the hull's 0.13 of 20 s
-    assert forecast.left == pytest.approx(16.7)
-    assert forecast.done == pytest.approx(0.165)
-    now[0] += 100.0  # far longer than foreseen: the rest is still to come, the bar stands
-    assert forecast.left == pytest.approx(20 * 0.77)
-    assert forecast.done == pytest.approx(0.10 + 0.95 * 0.13)
-    forecast.begin("writing")
+    now[0] += 0.5  # the bar runs on between two shares that are told
+    assert forecast.done == pytest.approx(0.125)
+    now[0] += 100.0  # far longer than foreseen: the bar stands 0.05 ahead
+    assert forecast.done == pytest.approx(0.15)
+    forecast.tell(0.2)  # at this pace, 0.2 in 102.5 s, four times as long is left
+    assert forecast.left == pytest.approx(410.0)
+    forecast.tell(None)
     assert (forecast.done, forecast.left) == (None, None)
-    assert forecast.elapsed == pytest.approx(108.3)
+    assert forecast.elapsed == pytest.approx(107.5)
 
 
-def test_nothing_is_foreseen_of_several_bodies_and_stages_may_be_missing() -> None:
+def test_a_share_that_falls_begins_another_run() -> None:
     now = [0.0]
     forecast = Forecast(lambda: now[0])
-    for stage in ("frame", "split"):  # no hull if surfaces are given
-        forecast.begin(stage)
+    for share in (0.0, 0.5, 1.0, 0.0):
+        forecast.tell(share)
         now[0] += 1.0
-    forecast.begin("thesis")
-    # 2 s for 0.14: the sheet's place, after 0.27.
-    assert forecast.left == pytest.approx(2 / 0.14 * 0.73)
-    forecast.begin("split")
     assert forecast.left is None
-    forecast.begin("map")
-    assert forecast.left is None
+    forecast.tell(0.25)  # a fourth in a second
+    assert forecast.left == pytest.approx(3.0)
 
 
 class _Terminal(io.StringIO):

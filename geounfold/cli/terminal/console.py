@@ -49,7 +49,7 @@ class Console:
         self._stream = None if given is None else cast(TextIO, Careful(given))
         self._quiet, self._json, self._plain = quiet, json, plain
         self._live = not quiet and self._stream is not None and self._stream.isatty()
-        self._shown = False
+        self._shown, self._stage = False, ""
         self._warned: set[str] = set()
         self._forecast = Forecast()
 
@@ -57,9 +57,21 @@ class Console:
     def _progress(self) -> Progress:
         return progress_on(cast(TextIO, self._stream), self._forecast, plain=self._plain)
 
-    def stage(self, name: str) -> None:
-        """Show the stage that begins, in place of the one before."""
-        if self._live:
+    def stage(self, name: str, done: float | None = None) -> None:
+        """Show the stage that runs, in place of the one before.
+
+        Parameters
+        ----------
+        name : str
+            Its name; "done" after the last.
+        done : float, optional
+            Share of the run that is done, 0 to 1, if it is known.
+        """
+        if not self._live:
+            return
+        self._forecast.tell(done)
+        if name != self._stage or not self._shown:
+            self._stage = name
             self._progress.stage(_one_line(name))
             self._shown = True
 

@@ -120,7 +120,6 @@ class RichProgress:
     def stage(self, name: str) -> None:
         """Show that a stage begins, in place of the one before."""
         with self._lock:
-            self._forecast.begin(name)
             self._bars.update(self._task, description=name)
             self._draw()
         if self._ticker is None:

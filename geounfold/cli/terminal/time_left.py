@@ -1,33 +1,18 @@
-"""How far a run has come, and how long it will take: from what stages took on other bodies."""
+"""How far a run has come, and how long it will take: from the share that it tells."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-SHARES = {
-    "frame": 0.10,
-    "hull": 0.13,
-    "split": 0.04,
-    "sheet": 0.50,
-    "map": 0.06,
-    "certificate": 0.08,
-    "quality": 0.09,
-}
-"""Share of an unfolding's time that each stage takes, in their order.
-
-Rounded means of sim_case_1, sim_case_2 and recumbent; the sheet took 0.45 to 0.62 there.
-"""
-
-_SAME = {"thesis": "sheet"}  # the thesis's method stands in the sheet's place
-_ALMOST = 0.95  # of a stage that takes longer than foreseen
+_EARLY = 0.03  # share done from which the time left is shown; before, it is a guess
+_AHEAD = 0.05  # share by which the bar may run ahead of what was told last
 
 
 class Forecast:
-    """Share done and seconds left of a run whose stages are told as they begin.
+    """Share done and seconds left of a run.
 
-    Nothing is foreseen before the first known stage is over, in a run of other stages, or once a
-    stage comes again (several bodies).
+    Nothing is foreseen of runs that tell no share, nor before the first few hundredths are done.
 
     Parameters
     ----------
@@ -37,50 +22,44 @@ class Forecast:
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         self._clock = clock
-        self._start = self._began = clock()
-        self._stage = ""
-        self._taken: dict[str, float] = {}
-        self._lost = False
+        self._start = clock()
+        self._begin = self._told_at = self._start
+        self._first = self._told = -1.0
 
     @property
     def elapsed(self) -> float:
         """Seconds since the run began."""
         return self._clock() - self._start
 
-    def begin(self, stage: str) -> None:
-        """Note that a stage begins, and that the one before is over."""
+    def tell(self, done: float | None) -> None:
+        """Note the share done, 0 to 1; None for work that is no part of it, such as writing.
+
+        A share below the one before begins another run, as in comparisons.
+        """
         now = self._clock()
-        if self._stage in SHARES:
-            self._taken[self._stage] = now - self._began
-        self._stage, self._began = _SAME.get(stage, stage), now
-        self._lost = self._lost or self._stage in self._taken
+        if done is None:
+            self._first = self._told = -1.0
+        elif self._told < 0 or done < self._told - 1e-9:
+            self._begin, self._first = now, done
+        if done is not None:
+            self._told, self._told_at = done, now
 
     @property
     def done(self) -> float | None:
-        """Share of the run that is over, 0 to 1; None where nothing is foreseen."""
-        known = self._known()
-        if known is None:
+        """Share of the run that is over, 0 to 1; None if nothing is foreseen."""
+        pace = self._pace()
+        if pace is None:
             return None
-        pace, before = known
-        share = SHARES[self._stage]
-        return before + share * min((self._clock() - self._began) / (pace * share), _ALMOST)
+        since = (self._clock() - self._told_at) * pace
+        return min(self._told + min(since, _AHEAD), 1.0)
 
     @property
     def left(self) -> float | None:
-        """Seconds that are left; None where nothing is foreseen."""
-        known = self._known()
-        if known is None:
-            return None
-        pace, before = known
-        share = SHARES[self._stage]
-        rest = max(pace * share - (self._clock() - self._began), 0.0)
-        return rest + pace * max(1.0 - before - share, 0.0)
+        """Seconds that are left; None if nothing is foreseen."""
+        pace, done = self._pace(), self.done
+        return None if pace is None or done is None else max(1.0 - done, 0.0) / pace
 
-    def _known(self) -> tuple[float, float] | None:
-        """Return the seconds that the whole takes, and the share before the stage."""
-        spent = sum(self._taken.values())
-        if self._lost or self._stage not in SHARES or spent <= 0:
-            return None
-        names = list(SHARES)
-        before = sum(SHARES[name] for name in names[: names.index(self._stage)])
-        return spent / sum(SHARES[name] for name in self._taken), before
+    def _pace(self) -> float | None:
+        """Return the share done per second; None if it is not known yet."""
+        gone, over = self._told - self._first, self._told_at - self._begin
+        return gone / over if self._told >= 0 and gone > _EARLY and over > 0 else None

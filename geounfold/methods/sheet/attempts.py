@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from geounfold.backends.progress import told, within
 from geounfold.errors import SplitError
 from geounfold.geometry.mesh import Floats
 from geounfold.methods.sheet.mid_surface.fit import (
@@ -267,10 +268,13 @@ def try_in_turn(case: Case) -> tuple[Trial, tuple[Trial, ...]]:
     for attempt in ATTEMPTS:
         if trials and attempt.needs_contradiction and not np.isfinite(trials[0].contradiction):
             continue
-        fitted = attempt.fit(case)
-        if fitted is None:
-            continue
-        trials.append(case.judge(attempt.name, fitted, attempt.rules))
+        before = 1 - 0.5 ** len(trials)  # most bodies need one attempt, few need all
+        with within(before, (1 + before) / 2):
+            fitted = attempt.fit(case)
+            if fitted is None:
+                continue
+            told(0.6)
+            trials.append(case.judge(attempt.name, fitted, attempt.rules))
         if trials[-1].holds:
             return trials[-1], tuple(trials)
     taken = _least_contradicted(case, trials)

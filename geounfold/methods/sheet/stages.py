@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geounfold.backends.progress import told, within
 from geounfold.errors import ControlMeshError, HullError, SplitError
 from geounfold.flattening import SpringOptions
 from geounfold.flattening import flatten as flatten_surface
@@ -58,15 +59,20 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
     """
     with body.stage("sheet"):
         unit = 1 if body.coarse is None else body.coarse.merge
-        medial = medial_sheet(body.split, _parameters, body.sheet_options.core)
+        with within(0.0, 0.08):
+            medial = medial_sheet(body.split, _parameters, body.sheet_options.core)
         case = _case(body, medial, unit)
-        trials = _fitted(case)
+        with within(0.08, 0.5):
+            trials = _fitted(case)
         plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell)
 
         def build(trial: Trial, misfit: float) -> tuple[FittedSheet, Horizons, SheetMesh]:
             fitted = conform(trial.fitted, medial.scaled(unit), _parameters)
+            told(0.1)
             horizons = _horizons(fitted, case.samples, trial, misfit)
-            return fitted, horizons, build_control(fitted, horizons, body.points, body.blocks, plan)
+            with within(0.2, 0.95):
+                mesh = build_control(fitted, horizons, body.points, body.blocks, plan)
+            return fitted, horizons, mesh
 
         hull = _judged_by(body, unit)
         walls = None
@@ -74,7 +80,8 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
             walls = body.walls.at_faces(hull.V[hull.F].mean(axis=1), face_normals(hull.V, hull.F))
         sides = body.frame.sides
         side = unit * (1.0 if sides is None else float(max(sides)))
-        best, finishes = finish_in_turn(trials, build, (hull, walls), body.frame, side)
+        with within(0.5, 1.0):
+            best, finishes = finish_in_turn(trials, build, (hull, walls), body.frame, side)
         if unit > 1 and not best.mesh.sound:
             raise ControlMeshError(f"no control mesh with cells of {unit} blocks a side is sound")
         return SheetResult(medial, trials, best, finishes)

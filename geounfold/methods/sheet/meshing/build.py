@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from geounfold.backends.igl import SurfaceIndex
+from geounfold.backends.progress import within
 from geounfold.flattening._result import Flattening
 from geounfold.geometry.mesh import Floats, TriMesh
 from geounfold.mapping.control_mesh import ControlMesh, Datum
@@ -410,7 +411,8 @@ def build_control(
         Settings of the mesh.
     """
     foot = block_feet(fitted, points, reach=10.0 * fitted.unit)
-    columns = _columns(fitted, horizons, foot, None, plan)
+    with within(0.1, 0.5):
+        columns = _columns(fitted, horizons, foot, None, plan)
     reach = _reach(foot)
 
     def constant() -> tuple[Columns, Layers]:
@@ -432,7 +434,8 @@ def build_control(
     rungs.append(("refined", refined))
     if not (_room(columns, _FOCAL) < reach).any():
         rungs.insert(0, ("constant", constant))
-    climbed = climb(rungs, blocks, SHRINKS)
+    with within(0.5, 1.0):
+        climbed = climb(rungs, blocks, SHRINKS)
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}

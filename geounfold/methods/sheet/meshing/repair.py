@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geounfold.backends.igl import TetIndex
+from geounfold.backends.progress import told
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.geometry.untangle import untangle
 from geounfold.mapping.certificate import Gluing, SpaceFlaws, examine
@@ -143,7 +144,8 @@ def climb(
     held: list[tuple[int, int, int, Columns, Laid]] = []
     flawed: list[tuple[int, int, Columns, Layers, _Exam]] = []
     hopeless: set[str] = set()
-    for name, make in rungs:
+    for number, (name, make) in enumerate(rungs):
+        told(1 - 0.5**number)
         if name in hopeless:
             continue
         columns, layers = make()

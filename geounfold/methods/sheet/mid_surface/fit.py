@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from geounfold.backends.progress import told
 from geounfold.errors import SplitError
 from geounfold.geometry.measures import unit
 from geounfold.geometry.mesh import Bools, Floats, Ints
@@ -365,6 +366,7 @@ def fit_mid_surface(
     slip: Floats | None = None
     near, smoothing = medial.uv, settings.smooth
     for turn in range(settings.rounds):
+        told(0.6 * turn / settings.rounds)
         foot = sheet.search(near, _REACH).feet(samples.points)
         misfit = _FIRST if turn == 0 else settings.later
         accepted = _accept(sheet, half, slip, foot, samples, misfit, near, settings)

@@ -22,6 +22,7 @@ from geounfold.io.messages import counted
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.prism_coordinates import PrismInterpolant
 from geounfold.methods import BodyFit, PointwiseMap, SurfacePair
+from geounfold.unfolding.level_horizons import flat_size, level_errors
 from geounfold.unfolding.measured import Measured
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.options_toml import to_toml
@@ -125,6 +126,8 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "inverted_folded": certificate.inverted_folded,
         "inverted_unfolded": certificate.inverted_unfolded,
         "injective": run.injective,
+        "horizons": level_errors(run),
+        "flat_size": flat_size(run),
         "coordinates": _coordinates(run),
         "certificate": certificate.as_dict(),
         "outside_share": run.outside / len(run.prepared.points),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
+from geounfold.cli.answers.closing import closing_lines, names_of
 from geounfold.cli.answers.file_endings import HTML, JSON, MAP, POINTS_OUT, TRACES, VTU
 from geounfold.cli.answers.unfolded import UnfoldedBody
 from geounfold.cli.domains.unfold import check_by, unfold_by
@@ -73,7 +74,9 @@ def run(args: Namespace, console: Console) -> None:
         unfolded.write(parts)
     for warning in unfolded.warnings:
         console.warn(warning)
-    console.done(f"{len(body.table)} points unfolded into {args.output}")
+    files = (args.output, args.summary, args.map, args.mesh, args.report)
+    written = names_of((*files, args.samples_out, args.traces_out))
+    console.close(lambda seconds: closing_lines(unfolded.summary, seconds, written))
     console.answer(unfolded.summary)
 
 

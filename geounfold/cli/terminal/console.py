@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, TextIO, cast
 
@@ -81,6 +81,19 @@ class Console:
             self._clear()
             self._write(f"{_one_line(text)} ({self._forecast.elapsed:.1f} s)\n")
 
+    def close(self, lines: Callable[[float], Sequence[str]]) -> None:
+        """Print the lines that end a run, on a terminal.
+
+        Parameters
+        ----------
+        lines : callable
+            Makes them from the seconds since the run began.
+        """
+        if self._live:
+            self._clear()
+            for line in lines(self._forecast.elapsed):
+                self._write(f"{_one_line(line, kept='  ')}\n")
+
     def warn(self, text: str) -> None:
         """Print a warning, in a pipe too, unless quiet; the same words once only."""
         if not self._quiet and text not in self._warned:
@@ -157,6 +170,10 @@ class Console:
             self._stream.flush()
 
 
-def _one_line(text: str) -> str:
-    """Return text without line breaks and control characters."""
+def _one_line(text: str, kept: str = "") -> str:
+    """Return text without line breaks and control characters; gaps of ``kept`` stay as they are."""
+    if kept and kept in text:
+        head, _, rest = text.partition(kept)
+        gap = len(rest) - len(rest.lstrip(" "))
+        return f"{_one_line(head)}{kept}{' ' * gap}{_one_line(rest)}"
     return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))

@@ -25,6 +25,7 @@ class Forecast:
         self._start = clock()
         self._begin = self._told_at = self._start
         self._first = self._told = -1.0
+        self._shown = 0.0  # the bar never runs back
 
     @property
     def elapsed(self) -> float:
@@ -40,7 +41,7 @@ class Forecast:
         if done is None:
             self._first = self._told = -1.0
         elif self._told < 0 or done < self._told - 1e-9:
-            self._begin, self._first = now, done
+            self._begin, self._first, self._shown = now, done, done
         if done is not None:
             self._told, self._told_at = done, now
 
@@ -51,7 +52,8 @@ class Forecast:
         if pace is None:
             return None
         since = (self._clock() - self._told_at) * pace
-        return min(self._told + min(since, _AHEAD), 1.0)
+        self._shown = max(self._shown, min(self._told + min(since, _AHEAD), 1.0))
+        return self._shown
 
     @property
     def left(self) -> float | None:

@@ -1,0 +1,48 @@
+"""How level the top and the bottom come out in the flat space, and how large the body is there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from geounfold.unfolding.summary import RunRecord
+
+
+def level_errors(run: RunRecord) -> dict[str, float | None]:
+    """Return the mean distance of the hull's top and bottom from their levels, in thicknesses.
+
+    The vertices of faces away from the rim are carried by the map; the stratigraphic coordinate of
+    the top is 1, of the bottom 0. None if no such vertex has an image.
+    """
+    frame, found = run.prepared.frame, {}
+    for name, side, level in (("top", 1, 1.0), ("bottom", -1, 0.0)):
+        misses = []
+        for fit in run.fits:
+            faces = fit.split.mesh.F[(fit.split.side == side) & ~fit.split.rim]
+            V = fit.split.mesh.V[np.unique(faces)]
+            misses.append(np.abs(run.map.carry(frame.to_world(V)).stratigraphic - level))
+        miss = np.concatenate(misses)
+        miss = miss[np.isfinite(miss)]
+        found[name] = float(miss.mean()) if len(miss) else None
+    return found
+
+
+def flat_size(run: RunRecord) -> dict[str, float | None]:
+    """Return length, width and thickness of the unfolded body, in the data's unit.
+
+    Length and width are the extents of the blocks' centroids along their principal axes in plan,
+    and a block's side; the thickness is the median over the hull's top and bottom.
+    """
+    carried, scale = run.measured.carried, run.prepared.frame.scale
+    plan = carried.points[carried.placed][:, :2]
+    thick = [fit.signs.thickness for fit in run.fits if fit.signs is not None]
+    known = [float(t) for t in thick if np.isfinite(t)]
+    if len(plan) < 2:
+        return {"length": None, "width": None, "thickness": None}
+    centred = plan - plan.mean(axis=0)
+    axes = np.linalg.eigh(centred.T @ centred)[1]
+    width, length = (np.ptp(centred @ axes, axis=0) + scale).tolist()
+    thickness = float(np.median(known)) * scale if known else None
+    return {"length": max(length, width), "width": min(length, width), "thickness": thickness}

@@ -168,7 +168,7 @@ def check_one_of(name: str, value: object, valid: Iterable[str], *, none: bool =
     words = tuple(valid)
     if not (isinstance(value, str) and value in words):
         error = _refusal(name, f"one of {', '.join(words)}", value, none)
-        raise OptionError(f"{error}{nearest(value, words)}")
+        raise OptionError(f"{error}{nearest(value, words) if isinstance(value, str) else ''}")
 
 
 def nearest(name: object, valid: Iterable[str]) -> str:

@@ -97,11 +97,8 @@ class UnfoldingMap:
 
     def __repr__(self) -> str:
         """Return one line: the control mesh, its coordinates and its reach."""
-        unit = self.frame.scale
-        return (
-            f"<UnfoldingMap of {len(self.control.folded.T)} tetrahedra by {self.coordinates} "
-            f"coordinates, blocks of {unit:.4g}, reach {self.reach * unit:.4g}>"
-        )
+        mesh, reach = self.control.folded, self.reach * self.frame.scale
+        return f"<UnfoldingMap of {len(mesh.T)} tetrahedra, {self.coordinates}, reach {reach:.4g}>"
 
     @cached_property
     def _folded(self) -> MeshSpace | PartsSpace:

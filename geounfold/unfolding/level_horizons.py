@@ -2,42 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from geounfold.unfolding.summary import RunRecord
+from geounfold.body.working_frame import Frame
+from geounfold.mapping.carried import Carried
+from geounfold.mapping.mesh_map import UnfoldingMap
+from geounfold.methods import BodyFit, PointwiseMap
 
 
-def level_errors(run: RunRecord) -> dict[str, float | None]:
+def level_errors(
+    fits: Sequence[BodyFit], mapping: UnfoldingMap | PointwiseMap, frame: Frame
+) -> dict[str, float | None]:
     """Return the mean distance of the hull's top and bottom from their levels, in thicknesses.
 
     The vertices of faces away from the rim are carried by the map; the stratigraphic coordinate of
     the top is 1, of the bottom 0. None if no such vertex has an image.
     """
-    frame, found = run.prepared.frame, {}
+    found: dict[str, float | None] = {}
     for name, side, level in (("top", 1, 1.0), ("bottom", -1, 0.0)):
         misses = []
-        for fit in run.fits:
+        for fit in fits:
             faces = fit.split.mesh.F[(fit.split.side == side) & ~fit.split.rim]
             V = fit.split.mesh.V[np.unique(faces)]
-            misses.append(np.abs(run.map.carry(frame.to_world(V)).stratigraphic - level))
+            misses.append(np.abs(mapping.carry(frame.to_world(V)).stratigraphic - level))
         miss = np.concatenate(misses)
         miss = miss[np.isfinite(miss)]
         found[name] = float(miss.mean()) if len(miss) else None
     return found
 
 
-def flat_size(run: RunRecord) -> dict[str, float | None]:
+def flat_size(fits: Sequence[BodyFit], carried: Carried, frame: Frame) -> dict[str, float | None]:
     """Return length, width and thickness of the unfolded body, in the data's unit.
 
     Length and width are the extents of the blocks' centroids along their principal axes in plan,
     and a block's side; the thickness is the median over the hull's top and bottom.
     """
-    carried, scale = run.measured.carried, run.prepared.frame.scale
+    scale = frame.scale
     plan = carried.points[carried.placed][:, :2]
-    thick = [fit.signs.thickness for fit in run.fits if fit.signs is not None]
+    thick = [fit.signs.thickness for fit in fits if fit.signs is not None]
     known = [float(t) for t in thick if np.isfinite(t)]
     if len(plan) < 2:
         return {"length": None, "width": None, "thickness": None}

@@ -300,7 +300,8 @@ class Unfolding:
         if cells:
             from geounfold.unfolding.block_corners import block_corners
 
-            made = hexahedra(block_corners(self, space, table)[keep], columns)
+            flat = (self.points, self.to_flat) if space == "unfolded" else ()
+            made = hexahedra(block_corners(table, self.folded, *flat)[keep], columns)
             made.cell_data[other] = there[keep]
             return made
         made = cloud(here[keep], columns)

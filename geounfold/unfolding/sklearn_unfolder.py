@@ -24,6 +24,8 @@ def _check_dense(X: Any) -> None:
     """Raise InputError for input that no body can be: sparse, complex, or not a table of three."""
     if hasattr(X, "toarray"):
         raise InputError("sparse input is not supported: give an array of (n, 3) coordinates")
+    if isinstance(X, pd.DataFrame):
+        return
     array = np.asarray(X)
     if np.iscomplexobj(array):
         raise InputError("Complex data not supported: coordinates are real numbers")

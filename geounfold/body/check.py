@@ -24,6 +24,9 @@ _FLAT = 0.05  # extent, in point spacings, below which points lie on a line or p
 _SCATTER = 0.38  # rms off the local surface per nearest distance: one layer 0.27, two 0.5
 _AROUND = 101  # nearest points in which three directions are looked for, the point itself included
 _SAMPLE = 2000  # points whose neighbourhoods are looked at
+_DEGREES = 10.0  # largest extent of a body in degrees, 1,100 km
+_TALL = 50.0  # z over x and y, of extents or of sides of blocks; in degrees 5,000 and more
+_UNEVEN = 300.0  # longest over shortest side of a block; of seam models 200, of mixed units 1,000
 _MIXED = np.array([1.0, np.sqrt(2) / 2, np.pi / 6])  # different rows hardly ever share a sum
 
 
@@ -77,6 +80,47 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
             "one block thick, whose thickness the points do not show; give at least two layers "
             "of blocks (smaller blocks across the sheet)"
         )
+
+
+def check_units(points: Floats, lattice: Lattice | None) -> None:
+    """Raise InputError if the axes are not in one unit, such as degrees beside metres.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Finite world coordinates.
+    lattice : Lattice or None
+        Their lattice.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = high - low
+    far = np.abs(points).max(axis=0)
+    tall = extent[2] / max(float(extent[:2].max()), np.finfo(float).tiny)
+    steps = None if lattice is None else np.abs(lattice.steps @ np.abs(lattice.axes))
+    if steps is not None:
+        tall = max(tall, float(steps[2] / steps[:2].max()))
+    on_the_globe = far[:2].max() <= 180 and far[:2].min() <= 90 and extent[:2].max() < _DEGREES
+    if on_the_globe and tall > _TALL:
+        raise InputError(
+            f"x and y look like degrees ({_range(low, high, 0)}, {_range(low, high, 1)}) beside "
+            f"z in a unit of length ({_range(low, high, 2)}); a body needs one unit along all "
+            "axes: project longitude and latitude to metres (UTM or the mine's grid)"
+        )
+    uneven = 0.0 if lattice is None else float(lattice.steps.max() / lattice.steps.min())
+    if max(uneven, tall) > _UNEVEN:
+        sides = extent if steps is None else steps
+        names = "the body's extents" if steps is None else "blocks' sides"
+        along = ", ".join(
+            f"{size:.4g} along {axis}" for size, axis in zip(sides, "xyz", strict=True)
+        )
+        raise InputError(
+            f"{names} are {along}: the axes are in different units, such as kilometres beside "
+            "metres; convert all coordinates to one unit"
+        )
+
+
+def _range(low: Floats, high: Floats, axis: int) -> str:
+    return f"{'xyz'[axis]} {low[axis]:.8g} to {high[axis]:.8g}"
 
 
 def _check_count(count: int, rows: int) -> None:

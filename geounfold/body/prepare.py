@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geounfold.body.check import check_points
+from geounfold.body.check import check_points, check_units
 from geounfold.body.coarsest_cells import coarsest_cells
 from geounfold.body.fault_surface import FaultWalls
 from geounfold.body.lattice import Lattice, distinct, measure_lattice
@@ -16,6 +16,7 @@ from geounfold.body.mending.mend import WORDS, Mended
 from geounfold.body.mending.record import MendedPlace, places_of
 from geounfold.body.noisy_lattice import disturbed_lattice
 from geounfold.body.parts.division import Division, divide
+from geounfold.body.rounded import unrounded
 from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
 from geounfold.body.sub_blocks import filled_cells
@@ -30,7 +31,7 @@ class PreparedPoints:
     Attributes
     ----------
     points : (n, 3) float
-        In the data's coordinates, as given.
+        In the data's coordinates, as given; rounded ones are put back on their lattice.
     work : (n, 3) float
         In working units, in which one block has volume 1.
     frame : Frame
@@ -46,6 +47,8 @@ class PreparedPoints:
     cells : (m, 3) int or None
         Cells of the lattice that the blocks of the bodies to unfold occupy, before mending; None
         without a lattice.
+    moved : float
+        How far at most rounded coordinates were moved, in their unit.
     """
 
     points: Floats
@@ -56,6 +59,7 @@ class PreparedPoints:
     mended: MendingRecord
     division: Division | None = None
     cells: Ints | None = None
+    moved: float = 0.0
 
     @property
     def bodies(self) -> int:
@@ -140,7 +144,10 @@ def prepare(
     OptionError
         There is no body of that number.
     """
+    check_units(points, None)
+    told, points = points, unrounded(points)
     lattice = measure_lattice(points)
+    check_units(points, lattice)
     cells = filled_cells(points, lattice)
     if cut is None:  # faults cut between single blocks
         cells = coarsest_cells(points, lattice, cells)
@@ -164,7 +171,10 @@ def prepare(
         bodies.append(BodyPoints(_sorted(fitted), _sorted(given[group]), found))
     chosen = np.isin(labels, [own[group[0]] for group in groups])
     taken = None if frame.steps is None else np.rint(work[chosen] / frame.steps).astype(np.int64)
-    prepared = PreparedPoints(points, given, frame, lattice, groups, record, cells=taken)
+    moved = 0.0 if told is points else float(np.abs(points - told).max())
+    prepared = PreparedPoints(
+        points, given, frame, lattice, groups, record, cells=taken, moved=moved
+    )
     return _divided(prepared, bodies) if parts else (prepared, bodies)
 
 

@@ -280,9 +280,16 @@ def _with_collar_directions(
     """
     bare = np.setdiff1d(np.arange(len(collars)), stations.hole)
     azimuth = np.where(np.abs(collars.dip) == 90.0, 0.0, collars.azimuth)
-    known = np.isfinite(azimuth) & (np.abs(collars.dip) <= 90.0)
+    turned = np.abs(azimuth) > 360.0
+    known = np.isfinite(azimuth) & ~turned & (np.abs(collars.dip) <= 90.0)
     for k in bare:
         given = bool(known[k])
+        if turned[k]:
+            log.add(
+                collars.source, "azimuth beyond 360 degrees", WARNING, "taken as missing",
+                hole=str(collars.names[k]), row=int(collars.row[k]),
+                detail=f"{azimuth[k]:g} degrees",
+            )  # fmt: skip
         log.add(
             collars.source,
             "unsurveyed hole",

@@ -143,6 +143,11 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
 def warnings_of(run: RunRecord) -> list[str]:
     """Return what a user should know before trusting the answer, one sentence each."""
     out = []
+    if run.prepared.moved:
+        out.append(
+            f"the coordinates were rounded: blocks were moved by up to {run.prepared.moved:.2g} "
+            "onto their lattice; export them with more digits if they are known"
+        )
     duplicates = count_duplicates(run.prepared.points)
     if duplicates:
         out.append(f"{duplicates} points repeat the coordinates of another; all were kept")

@@ -219,3 +219,13 @@ def test_grades_that_are_no_numbers_are_not_zero() -> None:
     assert ("CU is below detection", "A", 1) in found(holes)
     only = read_drillholes(collar, survey, assay, grades=["x"]).samples()
     assert only["CU"].tolist() == ["<0.01", "4"]
+
+
+def test_an_azimuth_beyond_a_turn_in_the_collar_table_is_named() -> None:
+    """Hole B has no survey, so its collar's direction counts: 450 may stand for 90 or 45."""
+    collar = pd.DataFrame({"BHID": ["A", "B"], "X": 0.0, "Y": [0.0, 50.0], "Z": 100.0})
+    collar = collar.assign(AZ=[90.0, 450.0], DIP=-60.0)
+    _, survey, assay = one_hole()
+    holes = read_drillholes(collar, survey, assay)
+    assert ("azimuth beyond 360 degrees", "B", 2) in found(holes)
+    assert "B" not in set(holes.traces()["hole"])

@@ -96,9 +96,7 @@ class UnfoldingMap:
         self._known = tuple(known)
 
     def __repr__(self) -> str:
-        """Return one line: the control mesh, its coordinates and its reach."""
-        mesh, reach = self.control.folded, self.reach * self.frame.scale
-        return f"<UnfoldingMap of {len(mesh.T)} tetrahedra, {self.coordinates}, reach {reach:.4g}>"
+        return f"<UnfoldingMap of {len(self.control.folded.T)} tetrahedra, {self.coordinates}>"
 
     @cached_property
     def _folded(self) -> MeshSpace | PartsSpace:
@@ -126,11 +124,8 @@ class UnfoldingMap:
         if self.shell is None:
             return self.control
         T = np.concatenate([self.control.folded.T, self.shell.folded.T])
-        return ControlMesh(
-            TetMesh(self.shell.folded.V, T),
-            TetMesh(self.shell.unfolded.V, T),
-            self.shell.stratigraphic,
-        )
+        folded, unfolded = TetMesh(self.shell.folded.V, T), TetMesh(self.shell.unfolded.V, T)
+        return ControlMesh(folded, unfolded, self.shell.stratigraphic)
 
     @cached_property
     def prisms(self) -> PrismInterpolant | None:

@@ -3,7 +3,7 @@
 # system libraries that README.md names.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env demo test test-all check format bench soak study notebooks docs accept clean
+.PHONY: help env demo test test-all imitate package check format bench soak study notebooks docs accept clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -13,6 +13,7 @@ DOCS_STAMP := $(VENV)/.docs
 EXTRAS := all,dev,notebooks
 ACCEPTANCE ?= ../shared/acceptance
 PYTEST_ARGS ?=
+SYSTEM ?= windows
 BENCH_ARGS ?=
 SCALE_ARGS ?=
 SOAK_ARGS ?=
@@ -53,6 +54,13 @@ test: $(STAMP)  ## run the tests and the docstrings' examples, on all cores
 
 test-all: $(STAMP)  ## run the tests, slow ones included
 	$(TESTS) $(PYTEST_ARGS)
+
+imitate: $(STAMP)  ## run the tests with what SYSTEM (windows or macos) lacks taken away
+	GEOUNFOLD_IMITATE=$(SYSTEM) PYTHONPATH=tests/imitation:$$PYTHONPATH \
+	    $(TESTS) -m 'not slow' $(PYTEST_ARGS)
+
+package:  ## build wheel and sdist, check them, try the wheel in an environment of its own
+	$(PYTHON) tools/check_package.py
 
 check: $(STAMP)  ## formatting, lint, types, import contract, notebooks equal to their scripts
 	$(BIN)/ruff format --check .

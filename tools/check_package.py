@@ -57,10 +57,11 @@ def check(*, newest: bool, keep: Path | None) -> dict[str, object]:
 
 def _environment(folder: Path, *packages: str) -> str:
     """Return the Python of a new environment with packages."""
-    venv.create(folder, with_pip=True)
+    venv.create(folder)  # some systems ship Python without ensurepip
     windows = os.name == "nt"
     own = str(folder / ("Scripts" if windows else "bin") / ("python.exe" if windows else "python"))
-    _run(own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages)
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", own)
+    _run(*pip, "install", "--quiet", "pip", *packages)
     return own
 
 

@@ -28,9 +28,9 @@ def python() -> str:
     sources = (ROOT / "pyproject.toml", ROOT / "constraints.txt")
     if not STAMP.exists() or STAMP.stat().st_mtime < max(s.stat().st_mtime for s in sources):
         if not Path(own).exists():
-            venv.create(VENV, with_pip=True)
-        words = ["install", "--quiet", "--constraint", "constraints.txt", "--editable", ".[dev]"]
-        _run(own, "-m", "pip", *words)
+            venv.create(VENV)  # some systems ship Python without ensurepip
+        words = ["install", "--quiet", "--constraint", "constraints.txt", "pip"]
+        _run(sys.executable, "-m", "pip", "--python", own, *words, "--editable", ".[dev]")
         STAMP.touch()
     return own
 

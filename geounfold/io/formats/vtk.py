@@ -77,7 +77,7 @@ def cloud(xyz: Floats, data: Mapping[str, np.ndarray]) -> Any:
 
 def hexahedra(corners: Floats, data: Mapping[str, np.ndarray]) -> Any:
     """Return cells of eight corners each, (n, 8, 3), and their values as a pyvista grid."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     n = len(corners)
     cells = np.column_stack([np.full(n, 8), np.arange(8 * n).reshape(n, 8)]).ravel()
@@ -93,7 +93,7 @@ def hexahedra(corners: Floats, data: Mapping[str, np.ndarray]) -> Any:
 
 def read_surface(path: Path) -> Surface:
     """Return a poly data file's faces; polygons are cut into triangles."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     mesh = _read(path)
     if isinstance(mesh, pyvista.UnstructuredGrid):
@@ -196,7 +196,7 @@ def _with_sides(
 
 def _faces_only(grid: Any) -> Any:
     """Return an unstructured grid whose cells all are faces as poly data, any other as it is."""
-    import pyvista
+    pyvista = require("pyvista", "VTK")
 
     faces = [int(getattr(pyvista.CellType, name)) for name in ("TRIANGLE", "POLYGON", "QUAD")]
     whole = np.isin(grid.celltypes, faces).all()

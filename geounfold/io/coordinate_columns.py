@@ -15,6 +15,8 @@ from geounfold.io.column_values import objects
 from geounfold.io.messages import counted, listing, shown
 from geounfold.io.packages.names import (
     DEGREES,
+    DEPTHS,
+    DOWN,
     WORLD,
     Triple,
     coordinate_sets,
@@ -82,6 +84,8 @@ def coordinate_columns(
         a, b, c = (_position(names, name, source) for name in columns)
         if len({a, b, c}) != 3:
             raise InputError(f"{source}: the columns {listing(columns)} are not three columns")
+        if plain_name(names[c]) in DOWN:
+            raise _counts_down(source, names[c])
         return a, b, c
     plain = [plain_name(name) for name in names]
     found = _sets(names, own)
@@ -92,6 +96,9 @@ def coordinate_columns(
             f"{source}: longitudes and latitudes are degrees, and a body needs one unit of length "
             "along all axes; project them to metres (UTM or the mine's grid) and export again"
         )
+    down = next((d for d in DEPTHS if set(d) <= set(plain)), None)
+    if down is not None:
+        raise _counts_down(source, names[plain.index(down[2])])
     if _all_numbers(names):
         hint = "the first row must name the columns"
     elif len(names) == 1:
@@ -101,6 +108,14 @@ def coordinate_columns(
     raise InputError(
         f"{source}: no coordinate columns (such as x, y, z or centroid_x, centroid_y, "
         f"centroid_z) found; the file has: {listing(names)}; {hint}"
+    )
+
+
+def _counts_down(source: str, name: str) -> InputError:
+    return InputError(
+        f"{source}: column '{shown(name)}' counts downwards, and a body needs heights that count "
+        "upwards, or it would be mirrored; change the sign (z = -depth, or surface less depth) and "
+        "name the new column z"
     )
 
 

@@ -46,7 +46,7 @@ def run(args: Namespace, console: Console) -> None:
     """Carry points, a wireframe or drill-holes with a saved map; points also back."""
     check_hole_options(args)
     _check_options(args)
-    frame = model_frame(args)
+    frame = model_frame(args, console, None if args.inverse else args.points)
     if frame is not None and (args.points is None or args.inverse):
         raise OptionError("--origin needs POINTS in the folded space, without --inverse")
     if args.engine == "dask":

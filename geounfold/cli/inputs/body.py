@@ -92,7 +92,7 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
     OptionError
         An option that does not fit its file.
     """
-    frame = model_frame(args)
+    frame = model_frame(args, console, args.points)
     solid = open_solid(args, console)
     if solid is None:
         table = open_table(args, console, frame=frame, whole=args.report is not None)

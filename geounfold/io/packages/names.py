@@ -55,9 +55,10 @@ _PLANS = tuple(
 COORDINATES: tuple[tuple[Triple, ...], ...] = (_FIRST_SETS, _PLANS, _axes(_SECOND))
 """Sets of names of coordinates, tier by tier."""
 
-DEPTHS: tuple[Triple, ...] = tuple(
-    (a, b, c) for (a, b), c in product(_PLAN, ("depth", "tvd", "tvdss", "zdown", "depthz"))
-)
+DOWN = ("depth", "tvd", "tvdss", "zdown", "depthz")
+"""Names of coordinates that count downwards."""
+
+DEPTHS: tuple[Triple, ...] = tuple((a, b, c) for (a, b), c in product(_PLAN, DOWN))
 """Sets whose third coordinate counts downwards."""
 
 DEGREES: tuple[tuple[str, str], ...] = (

@@ -8,7 +8,7 @@ all others.
 
 The interpreter is started by ``subprocess``, not by ``multiprocessing``: that would run the
 caller's own script again, cannot keep the new process out of the console's Ctrl-C, and starts a
-third process on macOS.
+third process on macOS. Measured on Linux, it takes 0.04 s of processor time to start, not 0.01.
 """
 
 from __future__ import annotations

@@ -114,8 +114,9 @@ def crash_of(code: int) -> str | None:
     >>> crash_of(-11), crash_of(0xC0000005), crash_of(3)
     ('SIGSEGV', 'access violation', None)
     """
-    if code < 0:
-        return signal.Signals(-code).name
+    if -128 < code < 0:
+        known = {each.value: each.name for each in signal.Signals}
+        return known.get(-code, f"signal {-code}")
     unsigned = code & 0xFFFFFFFF
     return _STATUSES.get(unsigned, f"{unsigned:#x}") if unsigned >= 0xC0000000 else None
 

@@ -21,7 +21,10 @@ from geounfold.report.faults import (
     joined_surfaces,
 )
 from geounfold.report.payload import CATEGORIES
+from geounfold.report.pictures import pictures
+from geounfold.report.plots.style import ViewOptions
 from geounfold.synthetic.faulted import simulate_faulted
+from tests.report.test_page import needs_rendering
 from tests.report.test_payload import decoded, lattice, packed
 
 PLACES = np.array([0.0, 1, 2, 3, 8, 9])  # along strike; 3 and 8 are no neighbours
@@ -179,3 +182,12 @@ def test_faults_of_an_unfolding_are_carried_by_their_own_blocks() -> None:
     moved = found.places("hanging", "folded") - found.places("foot", "folded")
     assert np.median(np.linalg.norm(moved, axis=1)) > 2.5 * body.step  # 50 of blocks of 15.9
     assert carried_faults(gu.unfold(gu.simulate("sim_case_1").folded)) is None
+
+
+@needs_rendering
+def test_a_still_picture_shows_the_fault_blocks() -> None:
+    body = report_body(BLOCKS, BLOCKS, COLUMNS)
+    found = list(pictures(body, ViewOptions(size=(80, 60))))
+    assert "Fault blocks: each was unfolded by itself" in found[0]
+    one = report_body(BLOCKS, BLOCKS, {"fault_block": np.zeros(len(BLOCKS), int)})
+    assert not any("Fault blocks" in p for p in pictures(one, ViewOptions(size=(80, 60))))

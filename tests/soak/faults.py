@@ -16,8 +16,8 @@ of both families.  A way is what geounfold is given besides the blocks:
 ``rms`` is the distance from the truth in blocks after the best turn, shift and one common shear
 (``flat_rms``); ``alone`` that of each true fault block fitted by itself.  ``jump`` is the error of
 the slip: the median distance, in blocks, that the answer leaves between both halves of one rock on
-a fault; ``jump_worst`` that of the worst fault.  ``throw_off`` is the worst fault's error of the
-median throw in the table of faults, in blocks.  A body's verdict is one of
+a fault; ``jump_worst`` that of the worst fault.  ``throw_off`` is the largest error of a median
+throw in the table of faults, in blocks.  A body's verdict is one of
 
   right            answered, and rms <= 0.5
   told             answered, not right, and trust is poor
@@ -178,15 +178,22 @@ def true_slip(body: Any) -> float:
     return float(np.concatenate(sizes).mean() / body.step)
 
 
-def throw_off(table: list[dict[str, Any]], body: Any) -> float:
-    """Return the largest error of a fault's median throw, in blocks; NaN if none is named."""
+def throw_off(table: list[dict[str, Any]], body: Any, found: np.ndarray) -> float:
+    """Return the largest error of a median throw, in blocks; NaN if none can be compared.
+
+    A row of the table is compared with the true slip between the same two fault blocks.
+    """
+    true = {int(k): int(np.bincount(body.fault_block[found == k]).argmax())
+            for k in np.unique(found[found >= 0])}  # fmt: skip
     errors = []
-    for name, slip in body.slips.items():
-        throws = [(row["pairs"], row["throw"]) for row in table if row["fault"] == name]
-        throws = [(pairs, throw) for pairs, throw in throws if throw is not None]
-        if throws and len(slip.flat):
-            mean = float(np.average([t for _, t in throws], weights=[n for n, _ in throws]))
-            errors.append(abs(mean - float(np.median(slip.throw))) / body.step)
+    for row in table:
+        slip = body.slips.get(row["fault"])
+        if slip is None or row["throw"] is None:
+            continue
+        pair = [true.get(row[wall]) for wall in ("footwall_block", "hanging_wall_block")]
+        rows = (slip.blocks == pair).all(axis=1)
+        if rows.sum() >= 10:
+            errors.append(abs(row["throw"] - float(np.median(slip.throw[rows]))) / body.step)
     return max(errors, default=NAN)
 
 
@@ -211,7 +218,7 @@ def judge(row: Row, body: Any, u: Any) -> None:
     if apart:
         row.jump, row.jump_worst = float(np.median(list(apart.values()))), max(apart.values())
     table = summary["faults"]
-    row.throw_off = throw_off(table, body)
+    row.throw_off = throw_off(table, body, found)
     row.gap = sum(fault["gap_area"] for fault in table) / body.step**2
     row.overlap = sum(fault["overlap_area"] for fault in table) / body.step**2
     row.settled = ", ".join(f"{fault['fault']} {fault['resolved_by']}" for fault in table)

@@ -31,7 +31,9 @@ def body() -> FaultedBody:
 
 
 def answer(body: FaultedBody, Y: np.ndarray, trust: str = "good", **more: Any) -> SimpleNamespace:
-    row = {"fault": "f1", "pairs": 10, "throw": 43.3, "gap_area": 200.0, "overlap_area": 100.0,
+    foot, hanging = body.slips["f1"].blocks[0].tolist()
+    row = {"fault": "f1", "footwall_block": foot, "hanging_wall_block": hanging, "pairs": 10,
+           "throw": 43.3, "gap_area": 200.0, "overlap_area": 100.0,
            "resolved_by": "shape"}  # fmt: skip
     facts = {"injective": True, "warnings": [], "trust": {"word": trust}, "faults": [row | more]}
     return SimpleNamespace(points=Y, fault_block=body.fault_block, summary=lambda: facts)

@@ -350,6 +350,7 @@ def _block_areas(
     cells, place = np.unique(cell, axis=0, return_inverse=True)
     count = np.bincount(place.ravel() * len(known) + code, minlength=len(cells) * len(known))
     most = count.reshape(len(cells), len(known)).argmax(axis=1)  # the fault block of each cell
+    cells, most = _closed(cells, most)
     areas, names = [], []
     for k, name in enumerate(known):
         colour, own = colours[k % len(colours)], cells[most == k]
@@ -358,6 +359,22 @@ def _block_areas(
         x, y = np.median(pixels[code == k], axis=0)
         names.append(f'<text class="mid" x="{x:.0f}" y="{y:.0f}">{text(name)}</text>')
     return "".join(areas), "".join(names)
+
+
+def _closed(cells: Ints, block: Ints) -> tuple[Ints, Ints]:
+    """Return cells (k, 2) and their fault blocks, holes of one cell's width filled.
+
+    Where few blocks lie in the middle of the layer, a cell may have none. It is filled from the
+    left or from below if the cells on both sides of it are not empty.
+    """
+    low = cells.min(axis=0) - 1
+    grid = np.full(cells.max(axis=0) - low + 2, -1)
+    grid[tuple((cells - low).T)] = block
+    for axis in (0, 1):
+        before, after = np.roll(grid, 1, axis), np.roll(grid, -1, axis)
+        grid = np.where((grid < 0) & (before >= 0) & (after >= 0), before, grid)
+    x, y = np.nonzero(grid >= 0)
+    return np.stack([x, y], axis=1) + low, grid[x, y]
 
 
 def _runs(cells: Ints, side: float) -> str:

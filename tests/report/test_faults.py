@@ -16,6 +16,7 @@ from geounfold.report.body import report_body
 from geounfold.report.columns import read_columns
 from geounfold.report.faults import (
     SLIP_COLUMNS,
+    _closed,
     cutoff_lines,
     faults_section,
     joined_surfaces,
@@ -182,6 +183,17 @@ def test_faults_of_an_unfolding_are_carried_by_their_own_blocks() -> None:
     moved = found.places("hanging", "folded") - found.places("foot", "folded")
     assert np.median(np.linalg.norm(moved, axis=1)) > 2.5 * body.step  # 50 of blocks of 15.9
     assert carried_faults(gu.unfold(gu.simulate("sim_case_1").folded)) is None
+
+
+def test_holes_of_one_cell_are_closed_and_the_outline_stays() -> None:
+    x, y = np.nonzero(np.ones((6, 5), bool))
+    cells = np.stack([x, y], axis=1)[(x != 3) | (y < 1)]  # a slit that reaches the outline
+    found, block = _closed(cells, (cells[:, 0] > 3).astype(int))
+    assert len(found) == 30
+    assert (*found.min(axis=0), *found.max(axis=0)) == (0, 0, 5, 4)
+    assert block[(found[:, 0] == 3) & (found[:, 1] > 0)].tolist() == [0] * 4
+    wide = cells[cells[:, 0] != 2]  # two cells wide, above the lowest row
+    assert len(_closed(wide, np.zeros(len(wide), int))[0]) == len(wide) + 1
 
 
 @needs_rendering

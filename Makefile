@@ -56,7 +56,7 @@ test-all: $(STAMP)  ## run the tests, slow ones included
 	$(TESTS) $(PYTEST_ARGS)
 
 imitate: $(STAMP)  ## run the tests with what SYSTEM (windows or macos) lacks taken away
-	GEOUNFOLD_IMITATE=$(SYSTEM) PYTHONPATH=tests/imitation:$$PYTHONPATH \
+	GEOUNFOLD_IMITATE=$(SYSTEM) PYTHONPATH="$(CURDIR)/tests/imitation$${PYTHONPATH:+:$$PYTHONPATH}" \
 	    $(TESTS) -m 'not slow' $(PYTEST_ARGS)
 
 package:  ## build wheel and sdist, check them, try the wheel in an environment of its own

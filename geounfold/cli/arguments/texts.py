@@ -8,9 +8,10 @@ POINTS = ".csv, .parquet or another format"
 
 POINT_FORMATS = """\
 formats of points:
-  .csv .csv.gz .parquet
+  .csv .csv.gz .parquet; .txt .asc .tsv .dat .xyz .prn (and .gz) read only
   GSLIB .gslib .geoeas .dat .gs (text becomes codes)
-  VTK .vtu; .vtp and .vti read only; of solid cells the centres are read
+  VTK .vtu .vtp; .vti .vtr .vts .vtk read only; of solid cells the centres
+  Surpac .str and lines of .dxf read only: their vertices
   GOCAD .vs (text becomes codes); .ts read only
   OMF .omf and .geoh5; of block models the centroids, dx, dy, dz and i, j, k"""
 

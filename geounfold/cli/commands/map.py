@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,6 +29,7 @@ from geounfold.io.result_columns import (
     result_columns,
     world_columns,
 )
+from geounfold.io.strings import STRINGS_OUT, holds_strings, read_strings, write_strings
 from geounfold.io.surfaces import read_surface_with_meta
 from geounfold.io.tables.parted import PartedTable
 
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats
     from geounfold.io import PointTable
     from geounfold.io.tables.large import PointStream
+    from geounfold.mapping.carried import Carried
     from geounfold.mapping.domain_map import DomainMap
     from geounfold.mapping.mesh_map import UnfoldingMap
 
@@ -54,7 +57,10 @@ def run(args: Namespace, console: Console) -> None:
         return
     outputs = Outputs.planned(
         {
-            "--output": (args.output, (*POINTS_OUT, *SURFACES_OUT)),
+            "--output": (
+                args.output,
+                tuple(dict.fromkeys((*POINTS_OUT, *SURFACES_OUT, *STRINGS_OUT))),
+            ),
             "--samples-out": (args.samples_out, POINTS_OUT),
             "--traces-out": (args.traces_out, TRACES),
         },
@@ -63,7 +69,9 @@ def run(args: Namespace, console: Console) -> None:
         watcher=console.journal,
     )
     existing_file(Path(args.map))
-    if args.points is not None and _is_wireframe(args):
+    if args.points is not None and _is_strings(args):
+        _carry_strings(args, frame, console, outputs)
+    elif args.points is not None and _is_wireframe(args):
         _carry_surface(args, frame, console, outputs)
     else:
         _carry_points(args, frame, console, outputs)
@@ -233,6 +241,57 @@ def _is_wireframe(args: Namespace) -> bool:
     return kind not in POINTS_OUT or holds_surface(args.points, args.element)
 
 
+def _is_strings(args: Namespace) -> bool:
+    """Return whether strings are written: by the ending of OUT and the content of POINTS."""
+    return ending(Path(args.output)) in STRINGS_OUT and holds_strings(args.points)
+
+
+def _carry_strings(
+    args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
+) -> None:
+    """Carry the vertices of strings and write the same strings through them."""
+    console.stage(f"reading {args.points}")
+    if args.where is not None:
+        raise OptionError(f"--where chooses rows of a table; {args.points} holds strings")
+    strings = read_strings(args.points)
+    placed = _carried_vertices(args, strings.xyz, frame, console, "string")
+    with outputs.writing() as parts:
+        write_strings(parts["--output"], replace(strings, xyz=placed.points))
+    _told(args, placed, console)
+
+
+def _carried_vertices(
+    args: Namespace, vertices: Floats, frame: ModelFrame | None, console: Console, what: str
+) -> Carried:
+    """Return the carried vertices of a wireframe or of strings.
+
+    Raises
+    ------
+    InputError
+        Some lie beyond the map's reach.
+    """
+    saved = one_map(args)
+    console.stage("carrying vertices")
+    placed = vertices if frame is None else frame.to_world(vertices)
+    carried = saved.carry(placed, inverse=args.inverse)
+    lost = int(np.count_nonzero(~np.isfinite(carried.points).all(axis=1)))
+    if lost:
+        raise InputError(
+            f"{args.points}: {lost} of {len(vertices)} vertices lie too far from the control mesh "
+            f"to be carried; cut the {what} nearer to the body, or write a table of its vertices"
+        )
+    return carried
+
+
+def _told(args: Namespace, carried: Carried, console: Console) -> None:
+    """Tell how many vertices were carried, and which lie outside."""
+    counts = place_counts(result_columns(UNFOLDED, carried))
+    for warning in outside_warnings(args.points, counts):
+        console.warn(warning)
+    console.done(f"{len(carried.points)} vertices carried into {args.output}")
+    console.answer({"vertices": counts})
+
+
 def _carry_surface(
     args: Namespace, frame: ModelFrame | None, console: Console, outputs: Outputs
 ) -> None:
@@ -241,20 +300,7 @@ def _carry_surface(
     if args.where is not None:
         raise OptionError(f"--where chooses rows of a table; {args.points} is a surface")
     mesh, meta = read_surface_with_meta(args.points, args.element)
-    saved = one_map(args)
-    console.stage("carrying vertices")
-    vertices = mesh.V if frame is None else frame.to_world(mesh.V)
-    carried = saved.carry(vertices, inverse=args.inverse)
-    lost = int(np.count_nonzero(~np.isfinite(carried.points).all(axis=1)))
-    if lost:
-        raise InputError(
-            f"{args.points}: {lost} of {len(mesh.V)} vertices lie too far from the control mesh to "
-            "be carried; cut the wireframe nearer to the body, or write a table of its vertices"
-        )
+    carried = _carried_vertices(args, mesh.V, frame, console, "wireframe")
     with outputs.writing() as parts:
         write_surface(parts["--output"], type(mesh)(carried.points, mesh.F), meta)
-    counts = place_counts(result_columns(UNFOLDED, carried))
-    for warning in outside_warnings(args.points, counts):
-        console.warn(warning)
-    console.done(f"{len(mesh.V)} vertices carried into {args.output}")
-    console.answer({"vertices": counts})
+    _told(args, carried, console)

@@ -15,9 +15,11 @@ from geounfold.io.formats.registry import (
     FORMATS,
     Format,
     Points,
+    Strings,
     Surface,
     find_format,
     point_endings,
+    string_endings,
     surface_endings,
 )
 
@@ -25,8 +27,10 @@ __all__ = [
     "FORMATS",
     "Format",
     "Points",
+    "Strings",
     "Surface",
     "find_format",
     "point_endings",
+    "string_endings",
     "surface_endings",
 ]

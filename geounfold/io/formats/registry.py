@@ -59,6 +59,35 @@ class Surface:
     meta: Meta = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
+class Strings:
+    """Polylines: outlines, strings of a survey, traces.
+
+    Attributes
+    ----------
+    xyz : (n, 3) float
+        Vertices, one string after the other, z up.
+    first : (k + 1,) int
+        String k has the vertices ``first[k]`` to ``first[k + 1] - 1``.
+    names : tuple of k str
+        Number or layer of each string.
+    meta : dict of str
+        Unit and coordinate reference, if known.
+    """
+
+    xyz: Floats
+    first: Ints
+    names: tuple[str, ...]
+    meta: Meta = field(default_factory=dict)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return a row for every vertex: string (its number from 1), name, x, y, z."""
+        count = np.diff(self.first)
+        number = np.repeat(np.arange(1, len(count) + 1), count)
+        name = np.repeat(np.array(self.names, dtype=object), count)
+        return {"string": number, "name": name, **dict(zip("xyz", self.xyz.T, strict=True))}
+
+
 @dataclass(frozen=True)
 class Format:
     """One family of files.
@@ -71,6 +100,8 @@ class Format:
         Module of this package.
     reads_points, writes_points, reads_surface, writes_surface : tuple of str
         Endings of files with which the module can do this.
+    strings : tuple of str
+        Endings of files of polylines that it reads and writes.
     numbers_only : bool
         Whether text columns are written as codes (see `coded`).
     library : str
@@ -85,6 +116,7 @@ class Format:
     writes_points: tuple[str, ...] = ()
     reads_surface: tuple[str, ...] = ()
     writes_surface: tuple[str, ...] = ()
+    strings: tuple[str, ...] = ()
     numbers_only: bool = False
     library: str = ""
     elements: bool = False
@@ -126,7 +158,8 @@ FORMATS = (
         library="geoh5py",
         elements=True,
     ),
-    Format("DXF", "dxf", (), (), (".dxf",), (".dxf",), library="ezdxf"),
+    Format("DXF", "dxf", (".dxf",), (), (".dxf",), (".dxf",), strings=(".dxf",), library="ezdxf"),
+    Format("Surpac strings", "surpac", (".str",), strings=(".str",)),
     Format("mesh", "meshes", (), (), _MESHES, _MESHES),
 )
 """All formats except tables."""
@@ -162,6 +195,11 @@ def point_endings(*, writing: bool = False) -> tuple[str, ...]:
 def surface_endings(*, writing: bool = False) -> tuple[str, ...]:
     """Return the endings of files of surfaces that can be read, or written."""
     return sum((f.writes_surface if writing else f.reads_surface for f in FORMATS), ())
+
+
+def string_endings() -> tuple[str, ...]:
+    """Return the endings of files of polylines."""
+    return sum((f.strings for f in FORMATS), ())
 
 
 def require(name: str, what: str) -> ModuleType:

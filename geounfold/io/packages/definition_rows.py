@@ -84,6 +84,8 @@ def definition_rows(
 
 
 def _is_data(row: Sequence[str], where: Sequence[int]) -> bool:
+    if where and len(row) == 1:  # a table of points has three columns or more
+        return False
     fields = [row[i] for i in where if i < len(row)] if where else row
     return any(is_number(field) for field in fields)
 

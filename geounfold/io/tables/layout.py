@@ -219,7 +219,9 @@ def _first_texts(rows: list[_Line], plain: list[int], separators: tuple[str, ...
         texts = [field for field in fields if field.strip() and not is_number(field)]
         if len(fields) == best[1] and len(texts) == len(fields):
             return _Names(k, rows[k], best[0], fields, False)
-    return None
+    fields = split(rows[some[0]].text, best[0])
+    bare = best[0] == BLANKS and all(map(is_number, fields))  # the error then shows the columns
+    return _Names(some[0], rows[some[0]], BLANKS, fields, False) if bare else None
 
 
 def _joined_names(rows: list[_Line], head: bytes) -> _Names:

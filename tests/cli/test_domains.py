@@ -222,3 +222,19 @@ def test_maps_of_one_body_and_of_several_are_told_apart(
     words = ["map", str(one), str(folder / "model.csv"), "-o", str(tmp_path / "o.csv")]
     assert main([*words, "--by", "DOMAIN"]) == 2
     assert "--by needs a map of domains" in capsys.readouterr().err
+
+
+def test_holes_and_samples_without_the_column_are_told(
+    folder: Path, tmp_path: Path, capsys
+) -> None:
+    model = pd.read_csv(folder / "model.csv")
+    seam = model[model["DOMAIN"] == "SEAM"].iloc[::50]
+    seam[["x", "y", "z"]].to_csv(tmp_path / "q.csv", index=False)
+    words = ["unfold", str(folder / "model.csv"), "-o", str(tmp_path / "o.csv"), "--by", "DOMAIN"]
+    more = ["--samples", str(tmp_path / "q.csv"), "--samples-out", str(tmp_path / "qo.csv")]
+    assert main([*words, *more, "--where", "DOMAIN=SEAM"]) == 0
+    assert "the samples: no column 'DOMAIN': each point was given" in capsys.readouterr().err
+    found = pd.read_csv(tmp_path / "qo.csv")
+    assert set(found["DOMAIN"]) == {"SEAM"}
+    flat = pd.read_csv(folder / "flat.csv").loc[seam.index, FLAT]
+    np.testing.assert_array_equal(found[FLAT], flat)

@@ -14,7 +14,7 @@ import numpy as np
 from geounfold.cli.answers.file_endings import POINTS_OUT, SURFACES_OUT, TRACES
 from geounfold.cli.answers.locations import flat_columns, outside_warnings, place_counts
 from geounfold.cli.domains.maps import domain_parts, domains_of, load_map, one_map
-from geounfold.cli.domains.unfold import carried_holes
+from geounfold.cli.domains.unfold import carried_holes, placed_told
 from geounfold.cli.inputs.drillholes import check_hole_options, read_holes
 from geounfold.cli.inputs.model_frame import model_frame
 from geounfold.cli.inputs.points import files_given, open_table, triple
@@ -132,6 +132,9 @@ def _carry_points(
         warnings = outside_warnings(args.points, points)
         for carrying in carryings:
             warnings += carrying.unsolved_warnings(args.points)
+    if several is not None:
+        told = {f"the holes' {name}": columns for name, columns in traced.items()}
+        warnings += placed_told(args.by or several.column, told)
     for name in traced:
         warnings += outside_warnings(f"the holes' {name}", counts[name])
     for warning in warnings:

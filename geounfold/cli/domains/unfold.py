@@ -174,6 +174,9 @@ class _Answer:
         found = [] if body.holes is None else body.holes.holes.messages()
         if body.samples is not None:
             found += outside_warnings(body.samples.source, place_counts(self._samples))
+        told = {"the samples": self._samples}
+        told |= {f"the holes' {name}": columns for name, columns in self._holes.items()}
+        found += placed_told(self._found.column, told)
         for name, columns in self._holes.items():
             found += outside_warnings(f"the holes' {name}", place_counts(columns))
         return found
@@ -190,6 +193,16 @@ def carried_holes(
             points = frame[list("xyz")].to_numpy(dtype=np.float64)
             found[name] = carried_columns(maps, column, frame, points)
     return found
+
+
+def placed_told(column: str, carried: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the warnings of points that were given to domains by their place."""
+    return [
+        f"{name}: no column '{column}': each point was given to the domain in or nearest to whose "
+        "body it lies; the output has the column"
+        for name, columns in carried.items()
+        if column in columns
+    ]
 
 
 def carried_columns(

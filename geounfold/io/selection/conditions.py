@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from geounfold.io.messages import shown
 Columns = Callable[[str], pd.Series]
 """Returns the column of a name."""
 
-_ORDER: dict[str, Callable[[Floats, Floats], np.ndarray]] = {
+_ORDER: dict[str, Callable[[Any, Any], np.ndarray]] = {
     "<": np.less,
     "<=": np.less_equal,
     ">": np.greater,
@@ -176,7 +177,11 @@ class Order(Condition):
 
     def of(self, columns: Columns) -> Bools:
         """Return which rows meet it, (n,)."""
-        left = _numbers(columns(self.column), self.sign)
+        column = columns(self.column)
+        if isinstance(self.other, Value) and _holds_dates(column):
+            dates, date = _dates(column), _date(column, self.other)
+            return np.asarray(_ORDER[self.sign](dates, date), dtype=bool)
+        left = _numbers(column, self.sign)
         if isinstance(self.other, OtherColumn):
             right = _numbers(columns(self.other.name), self.sign)
         elif self.other.number is None:
@@ -236,6 +241,8 @@ def _equal(column: pd.Series, value: Value) -> Bools:
         return _by_value(column, lambda values: _equal(values, value))
     if pd.api.types.is_bool_dtype(column.dtype):
         return _equal_truth(column, value)
+    if _holds_dates(column):
+        return np.asarray(_dates(column) == _date(column, value))
     values, _ = readable_numbers(column)
     typed = pd.api.types.is_numeric_dtype(column.dtype)
     if value.number is not None:
@@ -247,6 +254,26 @@ def _equal(column: pd.Series, value: Value) -> Bools:
             "text; compare it with a number"
         )
     return np.asarray((_words(column) == value.text) & ~_missing(column))
+
+
+def _holds_dates(column: pd.Series) -> bool:
+    return bool(pd.api.types.is_datetime64_any_dtype(column.dtype))
+
+
+def _dates(column: pd.Series) -> np.ndarray:
+    """Return a column of dates, (n,); missing ones compare as false."""
+    return np.asarray(pd.to_datetime(column.astype(object)), dtype="datetime64[ns]")
+
+
+def _date(column: pd.Series, value: Value) -> np.datetime64:
+    """Return the date that a value is, such as 2024-12-31."""
+    try:
+        return np.datetime64(value.text, "ns")
+    except ValueError as error:
+        raise InputError(
+            f"where: column '{shown(column.name)}' holds dates, and '{shown(value.text)}' is none; "
+            "write one such as 2024-12-31"
+        ) from error
 
 
 def _equal_truth(column: pd.Series, value: Value) -> Bools:

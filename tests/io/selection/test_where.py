@@ -134,3 +134,18 @@ def test_the_order_of_rows_permutes_the_choice() -> None:
     chosen = read_where("ORE=1 or AU<0.3").mask(TEXT)
     shuffled = read_where("ORE=1 or AU<0.3").mask(TEXT.iloc[order])
     np.testing.assert_array_equal(shuffled, chosen[order])
+
+
+def test_dates_are_compared_as_dates() -> None:
+    dates = pd.to_datetime(["2020-01-01", None, "2021-06-30"])
+    for values in (dates, pd.array(dates, dtype="timestamp[ns][pyarrow]")):
+        frame = pd.DataFrame({"MINED": values})
+        for text, rows in (
+            ("MINED = 2020-01-01", "100"),
+            ("MINED > '2020-12-31'", "001"),
+            ("MINED is missing", "010"),
+            ("MINED != '2020-01-01'", "011"),
+        ):
+            assert "".join(str(int(v)) for v in read_where(text).mask(frame)) == rows
+        with pytest.raises(InputError, match="holds dates, and 'soon' is none"):
+            read_where("MINED=soon").mask(frame)

@@ -104,7 +104,8 @@ def test_failing_last_output_leaves_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     replace_module(monkeypatch, "report.plots.rendering", check_rendering=lambda: None)
-    replace_module(monkeypatch, "report", write_report=_raise(error))
+    report = {"write_report": _raise(error), "carried_faults": lambda _: None}
+    replace_module(monkeypatch, "report", **report)
     assert main(["unfold", "p.csv", "-o", "out.csv", "--report", "r.html"]) in (2, 130)
     assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [points]

@@ -1,4 +1,4 @@
-"""Does taking faults out pay? Kriging of faulted bodies in six kinds of coordinates.
+"""Does taking faults out pay? Kriging of faulted bodies in seven kinds of coordinates.
 
     python tests/study/fault_gain.py [--seeds 4] [--bodies NAME ...] [--spacings 8 12]
                                      [-o data/fault_gain.csv] [--page docs/results/faults.md]
@@ -12,10 +12,12 @@ blocks apart, and estimated at every fourth other block, in arms that differ by 
   one body         unfolded as one sheet, faults untold
   each alone       fault blocks unfolded, each estimated from its own samples
   rejoined         unfolded with fault surfaces: all blocks in one flat space
+  true height      x and y of rejoined, moved onto the truth as a whole, with the true height: what
+                   is lost between it and truth is lost by the joining
   truth            true flat coordinates: the ceiling
 
-Every flat arm krige with the field's own variogram, every arm with the 24 nearest samples in units
-of the ranges. Share of the possible gain: (folded - arm) / (folded - truth), of mean RMSE.
+Every flat arm is kriged with the field's own variogram, every arm with the 24 nearest samples in
+units of the ranges. Share of the possible gain: (folded - arm) / (folded - truth), of mean RMSE.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ import geounfold as gu
 from geounfold.errors import GeounfoldError, InputError
 from geounfold.estimation import krige
 from geounfold.estimation.variogram import Structure
+from geounfold.quality.flat_truth import aligned_flat
 from geounfold.synthetic import GradeField
 from geounfold.synthetic.faulted import simulate_faulted
 
@@ -41,7 +44,9 @@ from faults import into_page  # noqa: E402
 BODIES = ("domino", "crossing", "strike_slip")
 RANGES = (250.0, 250.0, 25.0)
 NOISE = 0.1  # standard deviation of a sample's error
-ARMS = ("folded", "folded by block", "one body", "each alone", "rejoined", "truth")
+ARMS = (
+    *("folded", "folded by block", "one body", "each alone", "rejoined", "true height", "truth"),
+)
 FOLDED = (
     *((60.0, 60.0, 60.0), (100.0, 100.0, 100.0), (150.0, 150.0, 150.0), (250.0, 250.0, 25.0)),
     *((150.0, 250.0, 60.0), (80.0, 250.0, 80.0), (120.0, 250.0, 40.0), (60.0, 250.0, 60.0)),
@@ -102,7 +107,7 @@ def run(name: str, spacing: int, seed: int, flat: dict[str, np.ndarray], block: 
     }  # fmt: skip
     Y = flat["rejoined"]
     row["each alone"] = rmse(by_block(Y[S], z, Y[T], RANGES, own, of))
-    for arm in ("one body", "rejoined", "truth"):
+    for arm in ("one body", "rejoined", "true height", "truth"):
         row[arm] = rmse(estimated(flat[arm][S], z, flat[arm][T], RANGES)) if arm in flat else np.nan
     return row
 
@@ -113,7 +118,8 @@ def coordinates(name: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
     u = gu.unfold(body.folded, faults=body.surfaces)
     if not np.isfinite(u.points).all():
         raise InputError(f"{name}: blocks without flat coordinates cannot be compared")
-    flat = {"truth": body.truth, "rejoined": u.points}
+    level = np.column_stack([aligned_flat(u.points, body.truth)[:, :2], body.truth[:, 2]])
+    flat = {"truth": body.truth, "rejoined": u.points, "true height": level}
     try:
         one = gu.unfold(body.folded, body="all").points
     except GeounfoldError as error:
@@ -131,11 +137,12 @@ def share(means: pd.Series, arm: str) -> float:
 
 def table_of(rows: pd.DataFrame) -> str:
     """Return mean RMSE by body and spacing, and shares of the possible gain."""
-    heads = ["body", "blocks between holes", *ARMS, "share rejoined", "share each alone"]
+    shown = ("rejoined", "true height", "each alone")
+    heads = ["body", "blocks between holes", *ARMS, *(f"share {arm}" for arm in shown)]
     lines = [heads, ["---"] * len(heads)]
     for (body, spacing), some in rows.groupby(["body", "spacing"], sort=False):
         means = some[list(ARMS)].mean()
-        shares = (share(means, "rejoined"), share(means, "each alone"))
+        shares = [share(means, arm) for arm in shown]
         cells = ["-" if np.isnan(means[arm]) else f"{means[arm]:.3f}" for arm in ARMS]
         lines.append([str(body), str(spacing), *cells, *(f"{value:.2f}" for value in shares)])
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -96,6 +96,7 @@ def _log_grades(table: HoleTable, column: pd.Series, found: GradeValues, log: Lo
         (found.below, "below detection", f"taken as {becomes.get(rule, rule)}"),
         (found.wrong, "not a number", "taken as not assayed; declare codes by --missing"),
         (found.negative, "negative, perhaps a code", "kept unchanged; see --missing"),
+        (found.nines, "nines, perhaps a code", "kept unchanged; see --missing"),
     ):
         for i in np.flatnonzero(mask):
             log.add(

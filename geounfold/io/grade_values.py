@@ -184,6 +184,15 @@ class GradeValues:
         """Which values are negative, (n,)."""
         return np.asarray(self.values < 0)
 
+    @property
+    def nines(self) -> Bools:
+        """Which values are 999, 9999 or more nines and more than twice the next largest, (n,)."""
+        known = np.unique(self.values[np.isfinite(self.values)])
+        if not len(known) or not re.fullmatch(r"9{3,}(?:\.0*|\.9+)?", f"{known[-1]:.10g}"):
+            return np.zeros(len(self.values), dtype=bool)
+        alone = len(known) > 1 and known[-1] > 2 * known[-2]
+        return np.asarray(self.values == known[-1]) & alone
+
     def is_grade(self, column: pd.Series) -> bool:
         """Return whether a column holds a grade: half of its values or more are numbers.
 
@@ -229,6 +238,7 @@ class GradeValues:
             (self.below, "below detection", self._below_told()),
             (self.wrong, "no numbers", "taken as missing; declare codes by --missing"),
             (self.negative, "negative", "kept; declare codes by --missing"),
+            (self.nines, "nines, perhaps a code", "kept; declare codes by --missing"),
         )
         for mask, what, done in rest:
             at = np.flatnonzero(mask)
@@ -253,6 +263,7 @@ class GradeValues:
             "below_detection": int(np.count_nonzero(self.below)),
             "no_numbers": int(np.count_nonzero(self.wrong)),
             "negative": int(np.count_nonzero(self.negative)),
+            "nines": int(np.count_nonzero(self.nines)),
         }
 
     def _words(self, column: pd.Series) -> list[str]:

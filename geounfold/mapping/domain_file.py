@@ -88,6 +88,8 @@ def read_domains(path: str | Path) -> tuple[str, dict[str, bytes]]:
             return str(head["column"]), {
                 name: archive.read(f"{number}.npz") for number, name in enumerate(names)
             }
+    except InputError:
+        raise
     except (
         *(OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError),
         *(RuntimeError, zipfile.BadZipFile),

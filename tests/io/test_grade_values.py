@@ -19,7 +19,7 @@ def test_codes_are_missing_as_numbers_and_as_words() -> None:
     read = rules.read(column("1.5", "-99.0", "-999", "-", "BDL", "", "2"))
     np.testing.assert_array_equal(read.values, [1.5, *[np.nan] * 5, 2])
     assert read.facts() == {
-        "declared_missing": 4, "below_detection": 0, "no_numbers": 0, "negative": 0,
+        "declared_missing": 4, "below_detection": 0, "no_numbers": 0, "negative": 0, "nines": 0,
     }  # fmt: skip
     typed = rules.read(pd.Series([1.5, -99.0, np.nan], name="AU"))
     np.testing.assert_array_equal(typed.values, [1.5, np.nan, np.nan])
@@ -63,6 +63,14 @@ def test_negative_values_are_kept_and_told() -> None:
         "a.csv: column 'AU': 1 of 2 values is negative, the first '-99' at data row 1: kept; "
         "declare codes by --missing"
     ]
+
+
+def test_codes_of_nines_are_told() -> None:
+    lines = grade_of(column("0.5", "9999", "2", "9999.0"), "a.csv")[1]
+    assert len(lines) == 1
+    assert "2 of 4 values are nines, perhaps a code, the first '9999' at data row 2" in lines[0]
+    assert grade_of(column("998", "999", "1000"), "a.csv")[1] == []  # a grade in g/t
+    assert grade_of(column("998", "999"), "a.csv")[1] == []
 
 
 def test_caps_by_number_and_by_percentile_tell_what_they_changed() -> None:

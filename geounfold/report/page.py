@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from geounfold.geometry.mesh import Floats
 from geounfold.report.body import ReportBody, report_body
 from geounfold.report.faults import CarriedFaults, faults_section
+from geounfold.report.horizons import Horizons
 from geounfold.report.html_text import json_for_script, mapping, text
 from geounfold.report.payload import CATEGORIES, CarriedHoles, payload
 from geounfold.report.pictures import pictures
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 _SCRIPTS = ("decode", "colour", "camera", "renderer", "view", "inspect", "controls", "main")
 
 
-def write_report(  # 9 arguments: the file, the body, and by keyword what was carried with it
+def write_report(  # 10 arguments: the file, the body, and by keyword what was carried with it
     path: str | Path,
     summary: Mapping[str, Any],
     folded: Floats,
@@ -57,6 +58,7 @@ def write_report(  # 9 arguments: the file, the body, and by keyword what was ca
     *,
     holes: CarriedHoles | None = None,
     faults: CarriedFaults | None = None,
+    horizons: Horizons | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> None:
@@ -66,7 +68,7 @@ def write_report(  # 9 arguments: the file, the body, and by keyword what was ca
     ----------
     path : path
         The file to write; an existing one is replaced.
-    summary, folded, unfolded, columns, holes, faults, exploration, view
+    summary, folded, unfolded, columns, holes, faults, horizons, exploration, view
         As for `report_html`.
 
     Raises
@@ -78,13 +80,14 @@ def write_report(  # 9 arguments: the file, the body, and by keyword what was ca
         *(summary, folded, unfolded, columns),
         holes=holes,
         faults=faults,
+        horizons=horizons,
         exploration=exploration,
         view=view,
     )
     Path(path).write_text(page, encoding="utf-8")
 
 
-def report_html(
+def report_html(  # as write_report, without the file
     summary: Mapping[str, Any],
     folded: Floats,
     unfolded: Floats,
@@ -92,6 +95,7 @@ def report_html(
     *,
     holes: CarriedHoles | None = None,
     faults: CarriedFaults | None = None,
+    horizons: Horizons | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
 ) -> str:
@@ -113,6 +117,8 @@ def report_html(
         Drill-holes carried with the body.
     faults : CarriedFaults, optional
         Faults between the body's fault blocks.
+    horizons : mapping of SurfacePair, optional
+        Top and bottom surfaces in both spaces, by these names.
     exploration : Exploration, optional
         Exploratory data analysis of a grade of the samples carried with the body.
     view : ViewOptions, optional
@@ -129,7 +135,7 @@ def report_html(
     check_rendering()
     summary = without_folders(summary)
     unit = str(mapping(summary.get("input")).get("unit", ""))
-    viewer = payload(body, holes=holes, faults=faults, view=view, unit=unit)
+    viewer = payload(body, holes=holes, faults=faults, horizons=horizons, view=view, unit=unit)
     script = _script()
     return Template(asset("page.html")).substitute(
         title=text(_title(summary, body.total)),
@@ -160,10 +166,10 @@ def _sections(
 ) -> str:
     """Return the page's sections in order, without the empty ones."""
     parts = [
-        verdict_section(verdict(summary), summary.get("warnings", [])),
         views_section(
             notes, with_holes=carried.holes is not None, with_faults=carried.faults is not None
         ),
+        verdict_section(verdict(summary), summary.get("warnings", [])),
         faults_section(summary, carried.faults, body.unfolded, body.columns, CATEGORIES),
         stills_section(pictures(body, view)),
         figures_section(summary),

@@ -31,6 +31,7 @@ from geounfold.report.blocks import Shape, block_shape, chosen_blocks, gradients
 from geounfold.report.body import ReportBody
 from geounfold.report.columns import Column, read_columns
 from geounfold.report.faults import CarriedFaults, cutoff_lines, joined_surfaces
+from geounfold.report.horizons import Horizons, horizons_data
 from geounfold.report.plots.rendering import block_sides
 from geounfold.report.plots.style import ViewOptions, require
 
@@ -125,6 +126,7 @@ def payload(
     *,
     holes: CarriedHoles | None = None,
     faults: CarriedFaults | None = None,
+    horizons: Horizons | None = None,
     view: ViewOptions | None = None,
     unit: str = "",
 ) -> Payload:
@@ -138,6 +140,8 @@ def payload(
         Drill-holes carried with the body.
     faults : CarriedFaults, optional
         Faults between the body's fault blocks.
+    horizons : Horizons, optional
+        Top and bottom surfaces.
     view : ViewOptions, optional
         The viewer's direction at the start.
     unit : str, optional
@@ -156,6 +160,7 @@ def payload(
         "columns": columns,
         "holes": carried,
         "faults": torn,
+        "horizons": horizons_data(horizons, *corners),
         "palettes": palettes(),
         "categories": list(CATEGORIES),
         "view": {"azimuth": view.azimuth, "elevation": view.elevation},

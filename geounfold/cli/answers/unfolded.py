@@ -127,6 +127,7 @@ class UnfoldedBody:
             report_columns(table, block_results(result, slice(0, len(table)), self._asked)),
             holes=report_holes(body.holes, self._holes, body.samples, self._samples),
             faults=carried_faults(result),
+            horizons=result.surfaces,
             exploration=self._exploration,
         )
 

@@ -65,6 +65,13 @@ class Slice {
     if (!quiet) this.changed();
   }
 
+  // Let the other view's slice choose the blocks.
+  follow() {
+    if (!this.on) return;
+    this.axis.value = "";
+    this.moved(true);
+  }
+
   slide(steps) {
     if (!this.on) return;
     this.at.value = Number(this.at.value) + 20 * steps;
@@ -76,10 +83,22 @@ class Slice {
     return low + ((high - low) * Number(this.at.value)) / 1000;
   }
 
+  // The coordinate of the block nearest to the slice, so that one layer always has blocks.
+  nearest() {
+    const { get, count } = this.current, value = this.value;
+    let best = value, far = Infinity;
+    for (let k = 0; k < count; k++) {
+      const off = Math.abs(get(k) - value);
+      if (off < far) [best, far] = [get(k), off];
+    }
+    return best;
+  }
+
   // Return what tells of a block whether it is shown, or null where there is no slice.
   test() {
     if (!this.on) return null;
-    const { get, half } = this.current, value = this.value, small = 1e-6 * half;
+    const { get, half } = this.current, small = 1e-6 * half;
+    const value = this.keep.value === "slab" ? this.nearest() : this.value;
     if (this.keep.value === "below") return (k) => get(k) <= value + small;
     if (this.keep.value === "above") return (k) => get(k) >= value - small;
     return (k) => Math.abs(get(k) - value) <= half;

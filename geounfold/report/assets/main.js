@@ -22,7 +22,17 @@ function readModel(data) {
     sides: blocks.sides, sizes: blocks.sizes && pointsOf(blocks.sizes), axes: blocks.axes,
     grow: blocks.grow, unit: data.unit,
     columns: data.columns.map(columnOf), samples: null, traces: null, faults: null,
+    horizons: null,
   };
+  if (data.horizons && data.horizons.top) {
+    model.horizons = {};
+    for (const [name, packed] of Object.entries(data.horizons)) {
+      model.horizons[name] = {
+        triangles: arrayOf(packed.triangles), folded: pointsOf(packed.folded),
+        unfolded: pointsOf(packed.unfolded),
+      };
+    }
+  }
   if (data.faults.triangles) {
     model.faults = {
       vertices: pointsOf(data.faults.vertices), triangles: arrayOf(data.faults.triangles),
@@ -79,6 +89,30 @@ function segmentsOf(traces, space, centre) {
   return new Float32Array(out);
 }
 
+// The first known point of each hole, with the hole's name.
+function collarsOf(model, space) {
+  const holes = model.traces || model.samples, out = [];
+  if (!holes) return out;
+  const seen = new Set();
+  for (let k = 0; k < holes.count; k++) {
+    const hole = holes.hole[k], place = holes[space].place(k);
+    if (seen.has(hole) || !holes.names[hole] || !place.every(Number.isFinite)) continue;
+    seen.add(hole);
+    out.push({ name: holes.names[hole], place });
+  }
+  return out;
+}
+
+// The top and bottom surfaces in a space, relative to a centre.
+function horizonsOf(model, space, centre) {
+  const out = { top: null, bottom: null };
+  for (const name of model.horizons ? ["top", "bottom"] : []) {
+    const { triangles, [space]: points } = model.horizons[name];
+    out[name] = { places: relativeTo(points, centre), triangles };
+  }
+  return out;
+}
+
 // Places of points one after the other, relative to a centre.
 function relativeTo(points, centre) {
   const out = new Float32Array(3 * points.count);
@@ -113,6 +147,7 @@ function bodyOf(model, space, start) {
     places, extents, centre, seen, size, sides: model.sides, unit: model.gradientStep,
     unit_name: model.unit, gradients: space === model.bent ? model.gradients : null,
     segments: model.traces ? segmentsOf(model.traces, space, centre) : null,
+    ...horizonsOf(model, space, centre), collars: collarsOf(model, space),
     samples: null, sizes: model.sizes, axes: model.axes, grow: model.grow,
     cutoffs: model.faults && relativeTo(model.faults[space], centre),
     sheets: model.faults && space === "folded"
@@ -127,7 +162,8 @@ function bodyOf(model, space, start) {
   }
   const far = extents.map(([a, b], i) => Math.max(centre[i] - a, b - centre[i]));
   let reach = Math.hypot(...far);
-  for (const points of [body.segments, body.samples, body.sheets && body.sheets.places]) {
+  for (const points of [body.segments, body.samples, body.sheets && body.sheets.places,
+    body.top && body.top.places, body.bottom && body.bottom.places]) {
     for (let k = 0; points && k < points.length; k += 3) {
       const length = Math.hypot(points[k], points[k + 1], points[k + 2]);
       if (length > reach) reach = length;
@@ -156,7 +192,8 @@ class Report {
     this.views = SPACES.map((space) => new View(
       this.byId(space), bodyOf(this.model, space, data.view), data.view, watch));
     this.slices = SPACES.map((space, i) => new Slice(
-      this.byId(space), this.sliceAxes(space, this.views[i]), () => this.sliced()));
+      this.byId(space), this.sliceAxes(space, this.views[i]), () => this.sliced(i)));
+    for (const view of this.views) view.together = this.views;
     this.describe();
     this.setUp(data.start);
     this.colour();
@@ -173,6 +210,7 @@ class Report {
     const axes = [0, 1, 2].map((axis) => ({
       name: "xyz"[axis], get: (k) => points.at(k, axis), extent: body.extents[axis],
       half: 0.51 * wide[axis], step: points.step[axis], unit, towards: towards(axis),
+      count: this.model.count,
     }));
     if (space === "unfolded") {
       const height = this.model.columns.find((c) => c.name === "stratigraphic" && c.range);
@@ -180,7 +218,7 @@ class Report {
       axes[2] = height && {
         name: "height", get: height.get, extent: height.range, step: 0.01, unit: "",
         half: (0.51 * wide[2] * (height.range[1] - height.range[0])) / Math.max(thick, wide[2]),
-        towards: towards(2),
+        towards: towards(2), count: this.model.count,
       };
     }
     return axes;
@@ -200,9 +238,14 @@ class Report {
       this.byId(id).addEventListener("change", () => { this.colour(); this.draw(); });
     }
     this.setUpSamples();
-    for (const id of ["edges", "traces", "samples", "faults"]) {
+    for (const id of ["edges", "traces", "samples", "faults", "horizons", "names"]) {
       this.byId(id).addEventListener("change", () => this.draw());
     }
+    this.byId("tall").addEventListener("change", () => {
+      for (const view of this.views) view.tall = Number(this.byId("tall").value);
+      this.draw();
+    });
+    this.byId("picture").addEventListener("click", () => this.savePicture());
     this.byId("linked").addEventListener("change", () => this.turned(this.views[0]));
     for (const button of document.querySelectorAll("button[data-view]")) {
       button.addEventListener("click", () => this.lookFrom(button.dataset.view));
@@ -226,6 +269,12 @@ class Report {
     this.byId("samples").closest("label").hidden = !samples;
     this.byId("traces").closest("label").hidden = !this.model.traces;
     this.byId("faults").closest("label").hidden = !this.model.faults;
+    this.byId("horizons").closest("label").hidden = !this.model.horizons;
+    this.byId("names").closest("label").hidden = !this.views[0].labels.length;
+    if (samples && samples.count > FEW_DOTS) {
+      this.byId("thinned").textContent = ` (${FEW_DOTS.toLocaleString("en")} of `
+        + `${samples.count.toLocaleString("en")})`;
+    }
     select.closest("label").hidden = !samples || !samples.columns.length;
     if (!samples) return;
     const plain = { name: "one colour", label: "", group: "None", kind: "plain" };
@@ -261,8 +310,10 @@ class Report {
     for (const view of this.views) view.renderer.setSampleColours(shades, table);
   }
 
-  // Show the same blocks in both views: those that no slice hides; without slices the outer ones.
-  sliced() {
+  // Show the same blocks in both views: those of the slice, or without one the outer blocks. The
+  // slice set last leads and the other view follows it, so the two never hide everything.
+  sliced(leading) {
+    if (leading !== undefined && this.slices[leading].on) this.slices[1 - leading].follow();
     const tests = this.slices.map((slice) => slice.test()).filter(Boolean);
     const ids = new Uint32Array(this.model.count);
     let count = 0;
@@ -348,6 +399,36 @@ class Report {
     return k < count ? this.model[space].place(k) : samples[space].place(k - count);
   }
 
+  // Save both views side by side, with their titles and scales, as a PNG.
+  savePicture() {
+    this.drawNow();
+    const [first, second] = this.views.map((view) => view.canvas);
+    const gap = 12, head = 34, foot = 30, ratio = this.views[0].ratio || 1;
+    const picture = element("canvas");
+    picture.width = first.width + second.width + gap * ratio;
+    picture.height = Math.max(first.height, second.height) + (head + foot) * ratio;
+    const pen = picture.getContext("2d");
+    const [paper, ink] = ["--port", "--ink"].map((name) =>
+      getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+    pen.fillStyle = paper;
+    pen.fillRect(0, 0, picture.width, picture.height);
+    pen.fillStyle = ink;
+    this.views.forEach((view, i) => {
+      const left = i * (first.width + gap * ratio), low = head * ratio + view.canvas.height;
+      pen.drawImage(view.canvas, left, head * ratio);
+      pen.font = `${16 * ratio}px sans-serif`;
+      pen.fillText(view.root.querySelector("h3").textContent.trim(), left + 8 * ratio, 22 * ratio);
+      const wide = parseFloat(view.scaleBar.style.width) * ratio, right = left + view.canvas.width;
+      pen.font = `${13 * ratio}px sans-serif`;
+      pen.fillRect(right - wide - 10 * ratio, low + 6 * ratio, wide, 3 * ratio);
+      pen.fillText(view.scaleText.textContent, right - wide - 10 * ratio, low + 25 * ratio);
+    });
+    const link = element("a");
+    link.download = "unfolding.png";
+    link.href = picture.toDataURL("image/png");
+    link.click();
+  }
+
   // Draw once before the screen is next shown, however often it was asked for.
   draw() {
     if (this.asked) return;
@@ -362,6 +443,8 @@ class Report {
     const look = {
       edges: this.byId("edges").checked, traces: this.byId("traces").checked,
       samples: this.byId("samples").checked, faults: this.byId("faults").checked,
+      horizons: this.byId("horizons").checked, names: this.byId("names").checked,
+      top: [0.84, 0.37, 0], bottom: [0, 0.45, 0.7],
       fault: themeColour("--fault"), picked: this.picked,
       trace: themeColour("--trace"), pick: themeColour("--pick"), sample: [0.9, 0.62, 0],
     };

@@ -1,5 +1,6 @@
 // Drawing with WebGL 2: blocks as instanced boxes, holes as ribbons, samples as dots.
 
+const FEW_DOTS = 1500; // samples drawn at most, so that the body shows between them
 const WIDE = 2048; // texels a row; block k is texel k
 const COMMON = `#version 300 es
 precision highp float; precision highp int;
@@ -104,6 +105,13 @@ void main() {
   colour = vec4(base * plain.a, plain.a);
 }`;
 
+// Numbers below a count in an order whose beginning is spread evenly: steps of the golden section.
+function spread(count) {
+  const share = new Float64Array(count);
+  for (let k = 0; k < count; k++) share[k] = (k * 0.6180339887498949) % 1;
+  return Uint32Array.from(share.keys()).sort((a, b) => share[a] - share[b]);
+}
+
 // A box of side 1: corners and places on the side, two triangles each, counter-clockwise outside.
 function boxVertices() {
   const out = [];
@@ -142,7 +150,9 @@ class Renderer {
     this.makeBlocks();
     this.ribbons = this.makeRibbons(this.body.segments);
     this.cutoffs = this.makeRibbons(this.body.cutoffs);
-    this.makeSheets();
+    this.sheets = this.makeSheets(this.body.sheets);
+    this.top = this.makeSheets(this.body.top);
+    this.bottom = this.makeSheets(this.body.bottom);
     this.makeDots();
     this.makePicker();
     gl.enable(gl.DEPTH_TEST);
@@ -245,12 +255,12 @@ class Renderer {
     return made;
   }
 
-  makeSheets() {
-    const gl = this.gl, sheets = this.body.sheets;
-    this.sheetCount = sheets ? sheets.triangles.length : 0;
-    if (!this.sheetCount) return;
-    this.sheets = gl.createVertexArray();
-    gl.bindVertexArray(this.sheets);
+  // Return a surface, given by its places and triangles: a vertex array and its indices' count.
+  makeSheets(sheets) {
+    const gl = this.gl, made = { array: null, count: sheets ? sheets.triangles.length : 0 };
+    if (!made.count) return made;
+    made.array = gl.createVertexArray();
+    gl.bindVertexArray(made.array);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, sheets.places, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(0);
@@ -258,6 +268,7 @@ class Renderer {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, sheets.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
+    return made;
   }
 
   makeDots() {
@@ -275,6 +286,9 @@ class Renderer {
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(this.sampleCount).fill(-2), gl.DYNAMIC_DRAW);
     gl.enableVertexAttribArray(1);
     gl.vertexAttribPointer(1, 1, gl.FLOAT, false, 4, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, spread(this.sampleCount), gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
   }
 
   makePicker() {
@@ -334,10 +348,11 @@ class Renderer {
     const gl = this.gl, [right, up, back] = camera.axes();
     gl.useProgram(program);
     gl.uniformMatrix3fv(program.uniform("turn"), false, [
-      right[0], up[0], back[0], right[1], up[1], back[1], right[2], up[2], back[2]]);
+      right[0], up[0], back[0], right[1], up[1], back[1],
+      ...[right[2], up[2], back[2]].map((x) => x * size.tall)]);
     gl.uniform2f(program.uniform("scale"), ...size.scale);
     gl.uniform2f(program.uniform("shift"), ...size.shift);
-    gl.uniform1f(program.uniform("deep"), 1 / this.body.reach);
+    gl.uniform1f(program.uniform("deep"), 1 / (this.body.reach * size.tall));
   }
 
   // Draw what `look` asks for; `size` holds scale and shift in clip coordinates.
@@ -351,8 +366,12 @@ class Renderer {
       gl.depthFunc(hidden ? gl.GREATER : gl.LEQUAL);
       gl.depthMask(!hidden);
       gl.enable(gl.BLEND);
+      if (!hidden && look.horizons) {
+        this.drawSheets(this.top, camera, size, look.top, 0.3);
+        this.drawSheets(this.bottom, camera, size, look.bottom, 0.3);
+      }
       if (look.faults) {
-        if (!hidden) this.drawSheets(camera, size, look.fault);
+        if (!hidden) this.drawSheets(this.sheets, camera, size, look.fault, 0.18);
         this.drawRibbons(this.cutoffs, camera, size, look.fault, alpha);
       }
       if (look.traces) this.drawRibbons(this.ribbons, camera, size, look.trace, alpha);
@@ -414,14 +433,14 @@ class Renderer {
   }
 
   // Draw fault surfaces before what lies behind them: translucent, and they hide nothing.
-  drawSheets(camera, size, colour) {
-    if (!this.sheetCount) return;
+  drawSheets(sheets, camera, size, colour, alpha) {
+    if (!sheets.count) return;
     const gl = this.gl;
     this.useCamera(this.sheetProgram, camera, size);
-    gl.uniform4f(this.sheetProgram.uniform("plain"), ...colour, 0.18);
+    gl.uniform4f(this.sheetProgram.uniform("plain"), ...colour, alpha);
     gl.depthMask(false);
-    gl.bindVertexArray(this.sheets);
-    gl.drawElements(gl.TRIANGLES, this.sheetCount, gl.UNSIGNED_INT, 0);
+    gl.bindVertexArray(sheets.array);
+    gl.drawElements(gl.TRIANGLES, sheets.count, gl.UNSIGNED_INT, 0);
     gl.bindVertexArray(null);
     gl.depthMask(true);
   }
@@ -433,10 +452,12 @@ class Renderer {
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.sampleTable);
     gl.uniform1i(program.uniform("table"), 0);
-    gl.uniform1f(program.uniform("wide"), 6.5 * size.ratio);
+    const drawn = Math.min(this.sampleCount, FEW_DOTS);
+    gl.uniform1f(program.uniform("wide"), (drawn > 500 ? 4.5 : 6.5) * size.ratio);
     gl.uniform4f(program.uniform("plain"), ...colour, alpha);
     gl.bindVertexArray(this.dots);
-    gl.drawArrays(gl.POINTS, 0, this.sampleCount);
+    gl.drawElements(gl.POINTS, drawn, gl.UNSIGNED_INT, 0);
+    gl.bindVertexArray(null);
   }
 
   drawPicked(camera, size, look) {

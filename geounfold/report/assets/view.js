@@ -18,13 +18,30 @@ class View {
     this.scaleText = root.querySelector(".scale span");
     this.scaleBar = root.querySelector(".scale i");
     this.pointers = new Map();
+    this.tall = 1; // vertical exaggeration
+    this.together = [this];
+    this.labels = this.makeLabels();
     this.listen();
   }
 
-  // Pixels per unit of length at zoom 1, so that the body fills the view as it is first seen.
-  fit() {
-    const { width, height } = this.canvas, [wide, high] = this.body.seen;
+  // Pixels per unit of length at zoom 1, at which this view's own body fills it.
+  ownFit() {
+    const { width, height } = this.canvas, [wide, high] = this.seenSize();
     return 0.9 * Math.min(width / wide, height / high);
+  }
+
+  // The same for both views, so that a length is as long in one as in the other.
+  fit() {
+    return Math.min(...this.together.map((view) => view.ownFit()));
+  }
+
+  // Width and height of the body as it is first seen, with the vertical exaggeration.
+  seenSize() {
+    if (this.tall === 1) return this.body.seen;
+    const axes = new Camera(this.camera.start.azimuth, this.camera.start.elevation).axes();
+    const half = this.body.extents.map(([a, b], i) => (i === 2 ? this.tall : 1) * (b - a) / 2);
+    return [0, 1].map((i) => this.body.size
+      + 2 * axes[i].reduce((sum, x, j) => sum + Math.abs(x) * half[j], 0));
   }
 
   relative(place) {
@@ -34,7 +51,8 @@ class View {
   size() {
     const { width, height } = this.canvas, zoom = this.fit() * this.camera.zoom;
     return {
-      zoom, ratio: this.ratio, scale: [(2 * zoom) / width, (2 * zoom) / height],
+      zoom, ratio: this.ratio, tall: this.tall,
+      scale: [(2 * zoom) / width, (2 * zoom) / height],
       shift: [2 * this.camera.panX * (height / width), 2 * this.camera.panY],
     };
   }
@@ -42,6 +60,7 @@ class View {
   // Return where a place is seen: pixels of the page from the view's corner, and its depth.
   seen(place) {
     const [right, up, back] = this.camera.axes(), p = this.relative(place), size = this.size();
+    p[2] *= this.tall;
     const x = dot(right, p) * size.scale[0] + size.shift[0];
     const y = dot(up, p) * size.scale[1] + size.shift[1];
     return [
@@ -55,6 +74,36 @@ class View {
     this.drawRing(look.place);
     this.drawTriad();
     this.drawScale();
+    this.drawLabels(look.names);
+  }
+
+  // One label at the first known point of each hole.
+  makeLabels() {
+    const out = [];
+    for (const { name, place } of this.body.collars || []) {
+      const label = element("span", name);
+      label.className = "hole";
+      label.hidden = true;
+      this.root.querySelector(".port").append(label);
+      out.push({ label, place });
+    }
+    return out;
+  }
+
+  // Show the labels that do not cover each other, at most 60.
+  drawLabels(wanted) {
+    const taken = [];
+    for (const { label, place } of this.labels) {
+      label.hidden = true;
+      if (!wanted || taken.length >= 60) continue;
+      const [x, y] = this.seen(place), { clientWidth, clientHeight } = this.canvas;
+      if (x < 0 || y < 0 || x > clientWidth - 30 || y > clientHeight) continue;
+      const wide = 8 + 7 * label.textContent.length;
+      if (taken.some(([a, b, w]) => x < a + w && a < x + wide && Math.abs(y - b) < 15)) continue;
+      taken.push([x, y, wide]);
+      label.hidden = false;
+      label.style.transform = `translate(${(x + 4).toFixed(1)}px, ${(y - 16).toFixed(1)}px)`;
+    }
   }
 
   drawRing(place) {
@@ -84,7 +133,8 @@ class View {
     const length = power * [5, 2, 1].find((s) => s * power <= most);
     this.scaleBar.style.width = `${length / perPixel}px`;
     const unit = this.body.unit_name || "units";
-    this.scaleText.textContent = `${Number(length.toPrecision(3)).toLocaleString("en")} ${unit}`;
+    const tall = this.tall === 1 ? "" : `, height × ${this.tall}`;
+    this.scaleText.textContent = `${Number(length.toPrecision(3)).toLocaleString("en")} ${unit}${tall}`;
   }
 
   clip(event) {

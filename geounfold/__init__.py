@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from geounfold.mapping.mesh_map import UnfoldingMap, load
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
     from geounfold.quality.truth import aligned_rms
+    from geounfold.report.of_unfolding import report
     from geounfold.synthetic import simulate
     from geounfold.synthetic.faulted import simulate_faulted
     from geounfold.unfolding.dask_map import map_partitions
@@ -147,6 +148,7 @@ __all__ = [
     "nmd",
     "read_drillholes",
     "regular_grid",
+    "report",
     "simulate",
     "simulate_faulted",
     "transfer",
@@ -157,6 +159,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that starting costs little."""
+    if name == "report":  # a package that is called too
+        return import_module(f"{__name__}.report")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

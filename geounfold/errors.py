@@ -179,8 +179,8 @@ def nearest(name: object, valid: Iterable[str]) -> str:
     >>> nearest("flatener", ("flattener", "hull"))
     " (did you mean 'flattener'?)"
     """
-    words = {word.casefold(): word for word in valid}
-    found = get_close_matches(str(name).casefold(), words, n=1)
+    words = {word.casefold().lstrip("-"): word for word in valid}
+    found = get_close_matches(str(name).casefold().lstrip("-"), words, n=1)
     return f" (did you mean '{words[found[0]]}'?)" if found else ""
 
 

@@ -39,6 +39,7 @@ from geounfold.report.sections import (
     surfaces_section,
     verdict_section,
     views_section,
+    warnings_section,
 )
 from geounfold.report.verdict import verdict
 from geounfold.report.without_folders import without_folders
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
 _SCRIPTS = ("decode", "colour", "camera", "renderer", "view", "inspect", "controls", "main")
 
 
-def write_report(  # 10 arguments: the file, the body, and by keyword what was carried with it
+def write_report(  # 11 arguments: the file, the body, and by keyword what was carried with it
     path: str | Path,
     summary: Mapping[str, Any],
     folded: Floats,
@@ -61,6 +62,7 @@ def write_report(  # 10 arguments: the file, the body, and by keyword what was c
     horizons: Horizons | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
+    start: str = "",
 ) -> None:
     """Write the report of an unfolding to a file.
 
@@ -68,7 +70,7 @@ def write_report(  # 10 arguments: the file, the body, and by keyword what was c
     ----------
     path : path
         The file to write; an existing one is replaced.
-    summary, folded, unfolded, columns, holes, faults, horizons, exploration, view
+    summary, folded, unfolded, columns, holes, faults, horizons, exploration, view, start
         As for `report_html`.
 
     Raises
@@ -83,6 +85,7 @@ def write_report(  # 10 arguments: the file, the body, and by keyword what was c
         horizons=horizons,
         exploration=exploration,
         view=view,
+        start=start,
     )
     Path(path).write_text(page, encoding="utf-8")
 
@@ -98,6 +101,7 @@ def report_html(  # as write_report, without the file
     horizons: Horizons | None = None,
     exploration: Exploration | None = None,
     view: ViewOptions | None = None,
+    start: str = "",
 ) -> str:
     """Return the report of an unfolding as one HTML page that loads nothing from elsewhere.
 
@@ -106,7 +110,8 @@ def report_html(  # as write_report, without the file
     Parameters
     ----------
     summary : mapping
-        The summary of the unfolding; sections whose keys are missing are left out.
+        The summary of the unfolding; sections whose keys are missing are left out.  With a key
+        ``title`` the page is not about an unfolding, and has warnings in place of the verdict.
     folded, unfolded : (n, 3) float
         Block centroids in both spaces, in the same unit.  Blocks without an image are NaN in the
         unfolded space; they are counted but not drawn.
@@ -123,6 +128,8 @@ def report_html(  # as write_report, without the file
         Exploratory data analysis of a grade of the samples carried with the body.
     view : ViewOptions, optional
         Direction from which bodies are viewed.
+    start : str, optional
+        Column that colours the blocks at the start; by default the height in the layer.
 
     Raises
     ------
@@ -136,6 +143,8 @@ def report_html(  # as write_report, without the file
     summary = without_folders(summary)
     unit = str(mapping(summary.get("input")).get("unit", ""))
     viewer = payload(body, holes=holes, faults=faults, horizons=horizons, view=view, unit=unit)
+    if start:
+        viewer.content["start"] = start
     script = _script()
     return Template(asset("page.html")).substitute(
         title=text(_title(summary, body.total)),
@@ -169,7 +178,9 @@ def _sections(
         views_section(
             notes, with_holes=carried.holes is not None, with_faults=carried.faults is not None
         ),
-        verdict_section(verdict(summary), summary.get("warnings", [])),
+        warnings_section(summary)
+        if "title" in summary
+        else verdict_section(verdict(summary), summary.get("warnings", [])),
         faults_section(summary, carried.faults, body.unfolded, body.columns, CATEGORIES),
         stills_section(pictures(body, view)),
         figures_section(summary),
@@ -191,7 +202,9 @@ def _sections(
 
 
 def _title(summary: Mapping[str, Any], count: int) -> str:
-    """Return the page's title: the input file, or the number of blocks."""
+    """Return the page's title: its own, or that of an unfolding."""
+    if "title" in summary:
+        return str(summary["title"])
     return f"Unfolding of {mapping(summary.get('input')).get('file') or f'{count:,} blocks'}"
 
 

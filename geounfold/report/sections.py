@@ -56,6 +56,12 @@ def verdict_section(verdict: Verdict, warnings: object) -> str:
     return "".join(parts)
 
 
+def warnings_section(summary: Mapping[str, Any]) -> str:
+    """Return the warnings of a page without a verdict."""
+    warnings = summary.get("warnings", [])
+    return section("Warnings", bullets(warnings if isinstance(warnings, list | tuple) else []))
+
+
 def views_section(notes: tuple[str, ...], *, with_holes: bool, with_faults: bool) -> str:
     """Return the 3-D views, with notes on what they leave out."""
     return Template(asset("viewer.html")).substitute(

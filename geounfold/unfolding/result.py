@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, overload
 
@@ -381,6 +382,30 @@ class Unfolding:
             The method has no control mesh.
         """
         self.map.save(path)
+
+    def report(
+        self,
+        path: str | Path,
+        *,
+        samples: pd.DataFrame | None = None,
+        unit: str = "",
+        overwrite: bool = False,
+    ) -> None:
+        """Write the report: one page with pictures, verdict and figures; see `geounfold.report`.
+
+        Parameters
+        ----------
+        path : path
+            A file that ends in .html.
+        samples : DataFrame, optional
+            Other points to show in both spaces.
+        unit : str, optional
+            Unit of the coordinates, such as ``m``.
+        overwrite : bool
+            Whether an existing file is replaced.
+        """
+        write = import_module("geounfold").report  # the public one: reports stand above this room
+        write(self, path, samples=samples, unit=unit, overwrite=overwrite)
 
     def summary(self) -> dict[str, Any]:
         """Return what ran and how good it is, ready for JSON."""

@@ -58,6 +58,8 @@ class FakeUnfolding(FakeMap):
         self.columns = {"volume_ratio": np.ones(len(points))}
         self.warnings, self.junctions = warnings, ()
 
+    surfaces: dict[str, Any] = {}  # noqa: RUF012 - a fake has none
+
     def summary(self) -> dict[str, Any]:
         return {"points": len(self.points), "nmd": np.nan, "warnings": list(self.warnings)}
 

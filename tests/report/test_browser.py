@@ -263,6 +263,59 @@ def test_slices_show_the_same_blocks_in_both_views(page: Any) -> None:
     assert "outer blocks" in page.locator("#shown").text_content()
 
 
+def test_a_slice_leads_and_the_other_view_follows(page: Any) -> None:
+    page.select_option("#folded-axis", "0")
+    page.select_option("#unfolded-axis", "1")
+    assert page.input_value("#folded-axis") == ""  # the slice set last leads
+    for keep in ("below", "above", "slab"):
+        page.select_option("#unfolded-keep", keep)
+        for at in ("0", "333", "1000"):
+            page.evaluate(
+                """at => { const s = document.getElementById("unfolded-at"); s.value = at;
+                s.dispatchEvent(new Event("input")); }""",
+                at,
+            )
+            assert int(page.inner_text("#shown").split()[0].replace(",", "")) > 0
+
+
+def test_a_length_is_as_long_in_both_views(page: Any) -> None:
+    for tall in ("1", "5"):
+        page.select_option("#tall", tall)
+        ends = "height × 5" if tall == "5" else " m"
+        page.wait_for_function(
+            "ends => document.querySelector('.scale span').textContent.endsWith(ends)", arg=ends
+        )
+        widths = page.evaluate(
+            """[...document.querySelectorAll(".scale i")].map(e => e.style.width)"""
+        )
+        words = page.evaluate(
+            """[...document.querySelectorAll(".scale span")].map(e => e.textContent)"""
+        )
+        assert widths[0] == widths[1]
+        assert words[0] == words[1]
+
+
+def test_holes_are_named_and_north_is_shown(page: Any) -> None:
+    names = page.locator(".hole:visible")
+    assert names.all_inner_texts() == ["DH-1", "DH-1"]
+    page.uncheck("#names")
+    page.wait_for_function("!document.querySelector('.hole:not([hidden])')")
+    assert page.text_content("#folded .north") == "N"
+
+
+def test_a_picture_of_both_views_is_saved(page: Any, pictures: Path) -> None:
+    with page.expect_download() as saved:
+        page.click("#picture")
+    path = pictures / "saved.png"
+    saved.value.save_as(path)
+    assert saved.value.suggested_filename == "unfolding.png"
+    image = imread(path)
+    high, wide = image.shape[:2]
+    assert wide > 1.5 * high  # two views side by side
+    for half in (image[:, : wide // 2], image[:, wide // 2 :]):
+        assert len(np.unique(half.reshape(-1, half.shape[2]), axis=0)) > 100  # a body in each
+
+
 def test_samples_are_coloured_hidden_and_picked(page: Any) -> None:
     before = _seen(page, "folded")
     page.locator("#sample-colour").select_option(label="cu")

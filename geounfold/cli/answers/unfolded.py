@@ -65,6 +65,8 @@ class UnfoldedBody:
         self._holes = {} if body.holes is None else body.holes.carried(carry)
         self.warnings: list[str] = [*summary.get("warnings", []), *self._carried_warnings()]
         read = body.table.facts() | ({} if body.frame is None else body.frame.facts())
+        if summary.get("unit"):  # of --unit
+            read["unit"] = summary["unit"]
         self.summary = {**summary, "warnings": self.warnings, "input": read}
         if body.solid is not None:
             self.summary["solid"] = body.solid.facts()

@@ -62,6 +62,7 @@ def add_estimate(commands: Any) -> Parser:
     add_columns(group)
     group = parser.section("outputs")
     group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")
+    group.add("--report", metavar="R.html", help="a page: the grades in 3-D, folded and flat")
     group.add("--summary", metavar="S.json", help="options, variogram, figures, warnings")
     group.add(
         "--cross-validate",

@@ -72,11 +72,13 @@ def add_view(commands: Any) -> Parser:
         help=f"points: {POINTS}; or a map .npz. A table with unfolded_x/y/z or true_x/y/z too is "
         "drawn in both spaces",
     )
-    group.add("-o", "--output", metavar="PICTURE.png", required=True, help="the picture")
+    group.add("-o", "--output", metavar="PICTURE.png", help="the picture")
     group.add(
         "--colour",
+        nargs="?",
+        const="",
         metavar="COLUMN",
-        help="column of numbers that colours the points (default: stratigraphic, or height)",
+        help="column of numbers that colours the points; without COLUMN, list them",
     )
     add_columns(group)
     return parser

@@ -129,6 +129,9 @@ def _add_outputs(parser: Parser) -> None:
     group.add("-o", "--output", metavar="OUT", required=True, help=f"the result: {POINTS}")
     group.add("--summary", metavar="S.json", help="options, figures, proof, warnings, seconds")
     group.add("--map", metavar="M.npz", help="the map, for `geounfold map`")
+    group.add(
+        "--unit", metavar="U", rare=True, help="unit of the coordinates, for the report: m, ft"
+    )
     group.add("--report", metavar="R.html", help="a page: verdict, 3-D views, figures")
     group.add(
         "--slips",

@@ -6,7 +6,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from geounfold.cli.answers.file_endings import JSON, POINTS_OUT
+from geounfold.cli.answers.estimate_report import write_estimate_report
+from geounfold.cli.answers.file_endings import HTML, JSON, POINTS_OUT
 from geounfold.cli.domains.estimate import estimate_by
 from geounfold.cli.domains.maps import domains_of, load_map
 from geounfold.cli.inputs.points import files_given, read_all, read_samples
@@ -26,7 +27,11 @@ def run(args: Namespace, console: Console) -> None:
     from geounfold.cli.inputs.estimation import estimation, summarised
 
     outputs = Outputs.planned(
-        {"--output": (args.output, POINTS_OUT), "--summary": (args.summary, JSON)},
+        {
+            "--output": (args.output, POINTS_OUT),
+            "--summary": (args.summary, JSON),
+            "--report": (args.report, HTML),
+        },
         files_given(args.map, args.samples, args.points, args.variogram),
         overwrite=args.overwrite,
         watcher=console.journal,
@@ -40,6 +45,8 @@ def run(args: Namespace, console: Console) -> None:
     saved = load_map(args)
     several = domains_of(saved)
     if several is not None:
+        if args.report is not None:
+            raise OptionError("--report is for one domain: the map holds several")
         estimate_by(args, console, several, outputs, samples, whole)
         return
     table = PartedTable.chosen(whole)
@@ -50,6 +57,8 @@ def run(args: Namespace, console: Console) -> None:
         table.write(parts["--output"], result.columns)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
+        if "--report" in parts:
+            write_estimate_report(parts["--report"], summary, result, one, table, samples)
     for warning in result.warnings():
         console.warn(warning)
     known = result.blocks.counts()["estimated"]

@@ -56,6 +56,8 @@ def run(args: Namespace, console: Console) -> None:
             raise
         raise type(error)(f"{error}; {body.hint}") from error
     summary = {**result.summary(), "command": command_line(args)}
+    if args.unit is not None:
+        summary["unit"] = args.unit
     notes = [body.hint, body.box_hint(summary)]
     summary["warnings"] = [*filter(None, notes), *summary.get("warnings", [])]
     if args.crosscheck:

@@ -12,8 +12,9 @@ import numpy as np
 from geounfold.cli.answers.file_endings import MAP, PICTURE
 from geounfold.cli.inputs.points import TRUE, read
 from geounfold.cli.terminal.console import Console
-from geounfold.errors import InputError, OptionError
+from geounfold.errors import InputError, OptionError, nearest
 from geounfold.io import Outputs, PointTable
+from geounfold.io.messages import listing, shown
 from geounfold.io.paths import ending, existing_file
 from geounfold.io.result_columns import UNFOLDED
 from geounfold.io.tables.parted import ELSEWHERE, NOT_SELECTED
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
 
 def run(args: Namespace, console: Console) -> None:
     """Draw a saved map's control mesh, or points; in both spaces if the table has both."""
+    if args.colour == "":
+        table = read(args.points, args, console)
+        names = _number_columns(table)
+        console.answer({"columns": names}, lambda: "".join(f"{name}\n" for name in names))
+        return
+    if args.output is None:
+        raise OptionError("view needs -o PICTURE, or --colour alone to list the columns")
     outputs = Outputs.planned(
         {"--output": (args.output, PICTURE)},
         [args.points],
@@ -59,6 +67,11 @@ def _draw_map(path: str, console: Console) -> bytes:
 def _draw_points(table: PointTable, colour: str | None, console: Console) -> bytes:
     """Return a picture of points, coloured by a column, by layer or by height."""
     label = colour or _default_colour(table)
+    if label not in table.names:
+        raise InputError(
+            f"{table.source}: no column '{shown(label)}'{nearest(label, table.names)}; columns of "
+            f"numbers: {listing(_number_columns(table))}"
+        )
     there = _with_image(table)
     if not there.all():
         console.warn(f"{table.source}: {np.count_nonzero(~there)} points without an image left out")
@@ -81,6 +94,16 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
             look |= {"titles": titles}
             return png(bodies.draw_bodies(table.points[there], twin, values[there], label, **look))
     return png(bodies.draw_body(table.points[there], values[there], label, **look))
+
+
+def _number_columns(table: PointTable) -> list[str]:
+    """Return the columns that can colour: those that hold a number in every row that is drawn."""
+    there, found = _with_image(table), []
+    for name in table.names:
+        with suppress(InputError):
+            if np.isfinite(table.numbers(name)[there]).all():
+                found.append(name)
+    return found
 
 
 def _boxes_of(table: PointTable, there: Bools) -> dict[str, Any]:

@@ -30,8 +30,10 @@ def test_unfold_writes_everything(
         holes: Any,
         faults: Any,
         exploration: Any,
+        horizons: Any,
     ) -> None:
         assert exploration is None  # without --grade
+        assert horizons == {}
         assert faults is None  # without --faults
         seen.update(summary=summary, folded=folded, unfolded=unfolded, columns=columns, holes=holes)
         path.write_text("<html>")

@@ -53,7 +53,8 @@ def call_apart(
         {"function": np.array(function), **{f"in_{k}": v for k, v in arguments.items()}}
     )
     try:
-        with tempfile.TemporaryDirectory() as folder:  # fTetWild leaves files in its folder
+        # fTetWild leaves files in its folder; Windows keeps one while a process is in it.
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             done = subprocess.run(
                 [sys.executable, "-P", "-c", _START, str(os.getpid())],
                 input=request,

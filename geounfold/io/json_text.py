@@ -11,7 +11,7 @@ import numpy as np
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:
     """Write figures as a JSON file; NaN and infinity, which JSON lacks, become null."""
-    Path(path).write_text(json_text(content), encoding="utf-8")
+    Path(path).write_text(json_text(content), encoding="utf-8", newline="\n")
 
 
 def json_text(content: dict[str, Any]) -> str:

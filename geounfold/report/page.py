@@ -87,7 +87,7 @@ def write_report(  # 11 arguments: the file, the body, and by keyword what was c
         view=view,
         start=start,
     )
-    Path(path).write_text(page, encoding="utf-8")
+    Path(path).write_text(page, encoding="utf-8", newline="\n")
 
 
 def report_html(  # as write_report, without the file

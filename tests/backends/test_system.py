@@ -164,6 +164,14 @@ def test_terminals_that_redraw(terminal: str, can: bool, monkeypatch: pytest.Mon
     assert console.redraws(sys.stderr) == can
 
 
+def test_a_reader_that_has_left() -> None:
+    windows = type("WindowsError", (OSError,), {"winerror": None})
+    assert console.reader_has_left(BrokenPipeError(errno.EPIPE, "Broken pipe"))
+    assert console.reader_has_left(windows(errno.EINVAL, "Invalid argument"))
+    assert not console.reader_has_left(OSError(errno.EINVAL, "Invalid argument"))
+    assert not console.reader_has_left(OSError(errno.ENOSPC, "No space left on device"))
+
+
 def test_streams_of_an_old_code_page(monkeypatch: pytest.MonkeyPatch) -> None:
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding="cp1252", write_through=True)

@@ -119,6 +119,21 @@ def test_text_files_have_an_encoding() -> None:
     assert found == []
 
 
+def test_text_is_written_with_line_feeds() -> None:
+    # Without newline, Windows writes a carriage return before each.
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                modes = [a.value for a in node.args if isinstance(a, ast.Constant)]
+                writes = node.func.attr == "write_text" or (
+                    node.func.attr == "open" and {*modes} & {"w", "x", "a", "wt"}
+                )
+                if writes and "newline" not in {k.arg for k in node.keywords}:
+                    found.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert found == []
+
+
 @pytest.mark.parametrize(
     ("code", "named"),
     [

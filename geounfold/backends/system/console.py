@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import io
 import os
 import sys
@@ -20,6 +21,13 @@ def speak_to_any_console() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")
+
+
+def reader_has_left(error: OSError) -> bool:
+    """Return whether a pipe could not be written because nobody reads it any more."""
+    if isinstance(error, BrokenPipeError):
+        return True
+    return error.errno == errno.EINVAL and hasattr(error, "winerror")  # as Windows says it
 
 
 def redraws(stream: TextIO) -> bool:

@@ -20,6 +20,6 @@ def run(args: Namespace, console: Console) -> None:
         console.say(template())
         return
     with outputs.writing() as parts:
-        parts["--output"].write_text(template(), encoding="utf-8")
+        parts["--output"].write_text(template(), encoding="utf-8", newline="\n")
     console.done(f"options written into {args.output}")
     console.answer({"output": args.output})

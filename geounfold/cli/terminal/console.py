@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, TextIO, cast
 
+from geounfold.backends.system.console import reader_has_left
 from geounfold.cli.process.journal import Journal
 from geounfold.cli.terminal.progress import Careful, Progress, progress_on
 from geounfold.cli.terminal.time_left import Forecast
@@ -149,9 +150,9 @@ class Console:
         try:
             sys.stdout.write(text)
             sys.stdout.flush()
-        except BrokenPipeError:
-            raise
         except OSError as error:
+            if reader_has_left(error):
+                raise BrokenPipeError from error
             raise OutputError(f"cannot write to stdout: {error.strerror or error}") from error
 
     def _clear(self) -> None:

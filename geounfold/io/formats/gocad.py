@@ -94,7 +94,7 @@ def write_points(path: Path, points: Points) -> None:
     fields = [map(repr, c.tolist()) for c in (*points.xyz.T, *values)]
     for k, row in enumerate(zip(*fields, strict=True), 1):
         lines.append(f"{word} {k} {' '.join(row)}")
-    path.write_text("\n".join([*lines, "END", ""]), encoding="utf-8")
+    path.write_text("\n".join([*lines, "END", ""]), encoding="utf-8", newline="\n")
 
 
 def write_surface(path: Path, surface: Surface) -> None:
@@ -103,7 +103,7 @@ def write_surface(path: Path, surface: Surface) -> None:
     rows = enumerate(zip(*(map(repr, c.tolist()) for c in surface.V.T), strict=True), 1)
     lines += [f"VRTX {k} {' '.join(row)}" for k, row in rows]
     lines += [f"TRGL {a} {b} {c}" for a, b, c in (surface.F + 1).tolist()]
-    path.write_text("\n".join([*lines, "END", ""]), encoding="utf-8")
+    path.write_text("\n".join([*lines, "END", ""]), encoding="utf-8", newline="\n")
 
 
 def _head(kind: str, path: Path, meta: Meta, legends: list[str]) -> list[str]:

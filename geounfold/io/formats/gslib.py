@@ -114,4 +114,4 @@ def write_frame(path: Path, frame: pd.DataFrame, meta: Meta) -> None:
     head = ["; ".join(" ".join(t.split()) for t in title), str(len(made))]
     head += [" ".join(name.split()) or "column" for name in made]
     rows = map(" ".join, zip(*(map(repr, c.tolist()) for c in columns), strict=True))
-    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8")
+    path.write_text("\n".join([*head, *rows, ""]), encoding="utf-8", newline="\n")

@@ -61,7 +61,7 @@ def write_strings(path: Path, strings: Strings) -> None:
         number = int(name) if own else k % _LARGEST + 1
         lines += [f"{number}, {y!r}, {x!r}, {z!r}," for x, y, z in points.tolist()]
         lines.append(f"0, {zero},")
-    path.write_text("\n".join([*lines, f"0, {zero}, END", ""]), encoding="utf-8")
+    path.write_text("\n".join([*lines, f"0, {zero}, END", ""]), encoding="utf-8", newline="\n")
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray, tuple[str, ...], list[list[str]]]:

@@ -16,7 +16,15 @@ from geounfold.errors import InputError
 from geounfold.faults.block_map import BlockMap, Pose, posed
 from geounfold.faults.consistent import consistent_poses
 from geounfold.faults.cutoffs import cutoff, refined
-from geounfold.faults.cutting import CRUMB, FaultCut, cut_blocks
+from geounfold.faults.cutting import (
+    CRUMB,
+    FaultCut,
+    blocks_of_cells,
+    by_size,
+    cut_blocks,
+    joined_small,
+)
+from geounfold.faults.from_blocks import layer_normals, surfaces_between
 from geounfold.faults.given import MOST, FaultsGiven
 from geounfold.faults.joints import Joint, facing, first_poses
 from geounfold.faults.outline import Outlines
@@ -43,6 +51,7 @@ class Faulting:
         self.given = given
         self.surfaces: tuple[FaultSurface, ...] = ()
         self.notes: list[str] = []
+        self._pairs: tuple[tuple[int, int], ...] = ()
         self._frame: Frame | None = None
         self._points = np.zeros((0, 3))
         self._cut = FaultCut(*(np.zeros(0, np.int64),) * 3, 0)
@@ -60,8 +69,20 @@ class Faulting:
         self._frame, self._points = cells.frame, points
         self.surfaces = self.given.in_work(cells.frame)
         self._check_near(points)
-        self._cut = cut_blocks(points, self.surfaces, cells.frame, CRUMB)
-        self._check_cut()
+        if self.given.blocks is None:
+            self._cut = cut_blocks(points, self.surfaces, cells.frame, CRUMB)
+            self._check_cut()
+        else:
+            none = np.zeros(len(self.surfaces), np.int64)
+            own = blocks_of_cells(cells, self.given.blocks)[order]
+            self._cut = FaultCut(by_size(own), np.zeros((0, 2), np.int64), none, 0)
+        self._cut, told = joined_small(points, self._cut, cells.frame)
+        self.notes += told
+        if self._cut.count == 1:
+            raise InputError(
+                "there is one fault block: a body without faults is unfolded without "
+                "--fault-blocks and --faults"
+            )
         label = np.empty(len(points), np.int64)
         label[order] = self._cut.block
         return label
@@ -102,14 +123,54 @@ class Faulting:
         near = (seen.distance < 2.0) & ~seen.past
         return bool((near & (seen.signed > 0)).any() and (near & (seen.signed < 0)).any())
 
+    @property
+    def lacks_surfaces(self) -> bool:
+        """Whether only fault blocks are given, between which surfaces are to be fitted."""
+        return not self.surfaces
+
+    def find_surfaces(self, bodies: Sequence[BodyPoints], fits: Sequence[BodyFit | None]) -> None:
+        """Fit surfaces between the fault blocks.
+
+        Parameters
+        ----------
+        bodies : sequence of BodyPoints
+            The fault blocks.
+        fits : sequence of BodyFit or None
+            Each unfolded without walls, for the normals of its layers; None if it could not be.
+
+        Raises
+        ------
+        InputError
+            No two fault blocks end at a common surface.
+        """
+        frame = self._prepared_frame
+        normals = np.full(self._points.shape, np.nan)
+        for k, (body, fit) in enumerate(zip(bodies, fits, strict=True)):
+            if fit is not None and fit.control is not None:
+                rows = np.flatnonzero(self._cut.block == k)
+                block = BlockMap(body.fitted, fit, frame.steps, 1.0)
+                normals[rows] = layer_normals(block, self._points[rows])
+        self.surfaces, self._pairs = surfaces_between(self._points, self._cut.block, frame, normals)
+        if not self.surfaces:
+            raise InputError(
+                "no two fault blocks end at a common surface: are the ids of fault blocks, and "
+                "not of layers or domains? Give the faults by --faults"
+            )
+
     def walled(self, bodies: Sequence[BodyPoints]) -> list[BodyPoints]:
         """Return the fault blocks with the walls that bound each."""
         return [replace(b, walls=FaultWalls.around(b.fitted, self.surfaces)) for b in bodies]
 
+    @property
+    def _prepared_frame(self) -> Frame:
+        if self._frame is None:
+            raise TypeError("cut() comes first")
+        return self._frame
+
     def cells(self) -> FaultCells:
         """Return what gives folded points their fault block."""
-        frame = self._frame
-        side = 1.0 if frame is None or frame.sides is None else float(max(frame.sides))
+        sides = self._prepared_frame.sides
+        side = 1.0 if sides is None else float(max(sides))
         return FaultCells(self._points, self._cut.block, self.surfaces, side)
 
     def join(
@@ -126,9 +187,7 @@ class Faulting:
         reach : float
             Distance from a block to which its map carries, in blocks.
         """
-        frame = self._frame
-        if frame is None:
-            raise TypeError("cut() comes before join()")
+        frame = self._prepared_frame
         up = frame.up_in_work()
         blocks = [
             BlockMap(body.fitted, fit, frame.steps, reach)
@@ -173,10 +232,13 @@ class Faulting:
         out = []
         for number, surface in enumerate(self.surfaces):
             fine = refined(surface)
+            only = self._pairs[number] if self._pairs else None
             cuts = [cutoff(block, fine) for block in blocks]
             for a, low in enumerate(cuts):
                 for b, high in enumerate(cuts):
                     if low is None or high is None or low.side >= 0 or high.side <= 0:
+                        continue
+                    if only is not None and set(only) != {a, b}:
                         continue
                     if facing(low, high, fine, up):
                         out.append(Joint(a, b, number, fine, low, high, self._weld(a, b)))

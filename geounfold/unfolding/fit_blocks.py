@@ -40,6 +40,22 @@ def fit_blocks(
     return [_fitted(k, body, frame, options, stage) for k, body in enumerate(bodies)]
 
 
+def fit_untold(
+    bodies: Sequence[BodyPoints], frame: Frame, options: UnfoldOptions, stage: Stage
+) -> list[BodyFit | None]:
+    """Return the fits of fault blocks whose walls are not known yet; None if one fails.
+
+    Parameters as `fit_blocks` takes them.
+    """
+    out: list[BodyFit | None] = []
+    for body in bodies:
+        try:
+            out.append(fit(body, frame, options, None, stage))
+        except GeounfoldError:  # its surfaces are sought without the normals of its layers
+            out.append(None)
+    return out
+
+
 def _fitted(
     number: int, body: BodyPoints, frame: Frame, options: UnfoldOptions, stage: Stage
 ) -> BodyFit:

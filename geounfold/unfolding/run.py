@@ -35,7 +35,7 @@ from geounfold.mapping.parts_space import MapParts
 from geounfold.methods import METHODS, BodyFit, PointwiseMap
 from geounfold.unfolding.checks import check_faulted, check_method, check_single
 from geounfold.unfolding.clock import Clock, Progress
-from geounfold.unfolding.fit_blocks import fit_blocks
+from geounfold.unfolding.fit_blocks import fit_blocks, fit_untold
 from geounfold.unfolding.fit_body import fit
 from geounfold.unfolding.measured import measure
 from geounfold.unfolding.options import UnfoldOptions, check_names
@@ -187,6 +187,11 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
     """Return the run of a body cut into fault blocks, which are unfolded and joined."""
     with clock.stage("faults"):
         prepared, bodies = prepare(points, cut=faulting.cut)
+    if faulting.lacks_surfaces:
+        untold = fit_untold(bodies, prepared.frame, options, clock.stage)
+        with clock.stage("faults"):
+            faulting.find_surfaces(bodies, untold)
+    with clock.stage("faults"):
         bodies = faulting.walled(bodies)
     fits = fit_blocks(bodies, prepared.frame, options, clock.stage)
     with clock.stage("joining"):

@@ -112,3 +112,34 @@ def test_options_are_checked():
         gu.unfold(X, faults={"F1": surface}, slip_direction={"F1": (90, 145)})
     with pytest.raises(OptionError, match="two faults are called 'F1'"):
         gu.unfold(X, faults=[("F1", *surface), ("F1", *surface)])
+
+
+def test_fault_blocks_alone_give_surface_and_slip():
+    X, W, hanging, _ = faulted_slab()
+    u = gu.unfold(X, fault_blocks=np.where(hanging, "east", "west"))
+    # One block: the surface is fitted to staircases; left in, the fault moves one part by 4.2.
+    assert gu.aligned_rms(u.points, W) < 1.0
+    assert u.faults["throw"][0] == pytest.approx(3.0, abs=1.0)
+
+
+def test_small_fault_blocks_join_a_neighbour():
+    X, _, hanging, _ = faulted_slab()
+    ids = np.where(hanging, 1, 0)
+    ids[:60] = 2  # fewer than 200 blocks at one end
+    u = gu.unfold(X, fault_blocks=ids)
+    assert u.fault_block.max() == 1
+    assert any("fault block of 60 blocks" in warning for warning in u.summary()["warnings"])
+
+
+def test_fault_blocks_are_checked():
+    X, _, hanging, _ = faulted_slab()
+    with pytest.raises(InputError, match=r"one value per point, \(2400,\), but has \(5,\)"):
+        gu.unfold(X, fault_blocks=np.zeros(5))
+    with pytest.raises(InputError, match="400 points have no fault block, the first is row 1"):
+        gu.unfold(X, fault_blocks=np.where(np.arange(len(X)) < 400, np.nan, 1.0))
+    with pytest.raises(InputError, match="there is one fault block"):
+        gu.unfold(X, fault_blocks=np.zeros(len(X)))
+    with pytest.raises(InputError, match="at most 50 fault blocks: is it the right column"):
+        gu.unfold(X, fault_blocks=np.arange(len(X)))
+    with pytest.raises(InputError, match="there is no column 'ids'"):
+        gu.unfold(X, fault_blocks="ids")

@@ -132,7 +132,7 @@ def test_small_fault_blocks_join_a_neighbour():
 
 
 def test_fault_blocks_are_checked():
-    X, _, hanging, _ = faulted_slab()
+    X, *_ = faulted_slab()
     with pytest.raises(InputError, match=r"one value per point, \(2400,\), but has \(5,\)"):
         gu.unfold(X, fault_blocks=np.zeros(5))
     with pytest.raises(InputError, match="400 points have no fault block, the first is row 1"):

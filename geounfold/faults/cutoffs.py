@@ -23,6 +23,7 @@ MIDDLE = 2  # index of the middle level
 _FINE = 0.9  # blocks: longest edge of the carried surface, at 60 % of its edges
 _REACHED = 1.6  # blocks from a fault block within which a fault is its wall
 _SMOOTH = 3.0  # blocks: radius over which a cut-off is evened out
+_FEWEST = 6  # samples of the middle level that a cut-off must have
 _SHORTEST = 3.0  # blocks of length, per level, that a cut-off must have
 
 
@@ -112,6 +113,8 @@ def cutoff(block: BlockMap, fine: FaultSurface) -> Cutoff | None:
     Y, X, T, length, index = (np.concatenate(column) for column in zip(*found, strict=True))
     if not len(length) or length.sum() < _SHORTEST * len(LEVELS):
         return None
+    if np.count_nonzero(index == MIDDLE) < _FEWEST:
+        return None  # the fault ends inside the layer, or runs along it
     Y, T = smoothed(Y, T, length, index)
     seen = fine.sides(block.points)
     side = float(np.sign(np.sign(seen.signed[seen.distance < 2]).sum()))

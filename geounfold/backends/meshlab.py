@@ -7,11 +7,13 @@ instead of its documented default.
 
 from __future__ import annotations
 
+import sys
 from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
 
+from geounfold.backends.system.console import answers_kept_clean
 from geounfold.errors import BackendError, MissingDependencyError
 from geounfold.geometry.mesh import Floats, Ints
 
@@ -21,8 +23,11 @@ _CURE = "install OpenGL (Debian and Ubuntu: apt-get install libgl1 libopengl0)"
 
 
 def _pymeshlab() -> Any:
+    if (loaded := sys.modules.get("pymeshlab")) is not None:
+        return loaded
     try:
-        import pymeshlab
+        with answers_kept_clean():  # it prints the names of plugins that lack a system library
+            import pymeshlab
     except ImportError as error:
         raise MissingDependencyError(
             f"pymeshlab cannot be loaded ({error}); pip install pymeshlab, or if it names a "

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -72,3 +74,22 @@ def test_an_absent_pymeshlab_is_named(monkeypatch):
 def test_a_surface_without_vertices_is_refused():
     with pytest.raises(BackendError, match="MeshLab cannot take the surface"):
         meshlab.taubin(np.empty((0, 3)), np.empty((0, 3), np.int64), 1)
+
+
+def test_what_the_library_prints_when_loaded_stays_out_of_answers(tmp_path: Path) -> None:
+    # pymeshlab names plugins that lack a system library on stdout.
+    fake = (
+        "import os\nos.write(1, b'Unable to load the following plugins')\nraise ImportError('x')\n"
+    )
+    (tmp_path / "pymeshlab.py").write_text(fake, encoding="utf-8")
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from geounfold.backends.meshlab import _pymeshlab\n"
+        "try: _pymeshlab()\n"
+        "except Exception as error: print(type(error).__name__)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["MissingDependencyError"]
+    assert "Unable to load" in done.stderr

@@ -7,6 +7,8 @@ import errno
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 _ESCAPES = 4  # ENABLE_VIRTUAL_TERMINAL_PROCESSING of consoleapi.h
@@ -21,6 +23,23 @@ def speak_to_any_console() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def answers_kept_clean() -> Iterator[None]:
+    """Send what libraries write to stdout to stderr, so that answers on stdout stay whole."""
+    kept = None
+    with suppress(OSError):  # stdout or stderr is closed
+        kept = os.dup(1)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        if kept is not None:
+            os.dup2(kept, 1)
+            os.close(kept)
 
 
 def reader_has_left(error: OSError) -> bool:

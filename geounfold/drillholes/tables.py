@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from geounfold.drillholes.findings import WARNING, Log
+from geounfold.drillholes.findings import NOTE, WARNING, Log
 from geounfold.errors import InputError, OptionError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
@@ -140,6 +140,8 @@ def read_hole_table(
             raise InputError(f"{source}: has no rows")
     else:
         source, table = str(given), read_table(given)
+        for line in table.notes:
+            log.add(source, line, NOTE, "so it was read")
     names = [str(name) for name in table.frame.columns]
     fields = _fields(kind, names, columns, source)
     row = np.arange(1, len(table.frame) + 1)

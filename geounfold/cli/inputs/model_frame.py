@@ -15,6 +15,35 @@ if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats
 
 
+def found_frame(path: str, columns: str | None, console: Console | None) -> ModelFrame | None:
+    """Return the frame that a file's columns hold, and tell it; None if they hold none.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    columns : str or None
+        The three columns that the user names; the frame is that of XC, YC, ZC.
+    console : Console or None
+        Shows what was assumed.
+
+    Raises
+    ------
+    InputError
+        The frame cannot be used.
+    """
+    if columns is not None and plain_columns(columns) != ("xc", "yc", "zc"):
+        return None
+    from geounfold.io.packages.datamine import frame_in
+
+    found = frame_in(path)
+    if found is None:
+        return None
+    if console is not None:
+        console.note(f"{path}: {found.note}")
+    return found.frame
+
+
 def plain_columns(text: str) -> tuple[str, ...]:
     """Return the plain names of an option's three columns."""
     from geounfold.io.packages.names import plain_name
@@ -53,16 +82,7 @@ def model_frame(
         The file's columns hold a frame that cannot be used.
     """
     if args.origin is None and args.rotation is None and path is not None:
-        if args.columns is not None and plain_columns(args.columns) != ("xc", "yc", "zc"):
-            return None
-        from geounfold.io.packages.datamine import frame_in
-
-        found = frame_in(path)
-        if found is None:
-            return None
-        if console is not None:
-            console.note(f"{path}: {found.note}")
-        return found.frame
+        return found_frame(path, args.columns, console)
     if args.origin is None:
         if args.rotation is not None:
             raise OptionError(

@@ -6,6 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from geounfold.cli.inputs.model_frame import found_frame
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_points
 from geounfold.io.coordinate_columns import parse_columns
@@ -74,7 +75,8 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
     prefer : tuple of three column names each, optional
         Columns that are read before others.
     place : callable, optional
-        From the file's coordinates, (n, 3), to the world's.
+        From the file's coordinates, (n, 3), to the world's. By default that of the frame in the
+        file's columns, if they hold one.
     drop_invalid : bool
         Leave out rows without finite coordinates; else such a row is an InputError.
     where : Where, optional
@@ -83,6 +85,9 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
         Name of the element to read, for a file of several.
     """
     console.stage(f"reading {path}")
+    if place is None and not prefer:
+        frame = found_frame(path, columns, console)
+        place = None if frame is None else frame.to_world
     table = read_points(
         path, triple(columns),
         prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,

@@ -10,13 +10,14 @@ do not show the sense of turns about x and y, so for these the user is asked.
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from geounfold.body.model_frame import ModelFrame, axes_from_angles
-from geounfold.errors import InputError
+from geounfold.errors import InputError, MissingDependencyError
 from geounfold.geometry.mesh import Floats
 from geounfold.io.coordinate_columns import numbers
 from geounfold.io.packages.names import WORLD, plain_name
@@ -28,6 +29,8 @@ _PLACE = ("x0", "y0", "z0")
 _ANGLES = ("angle1", "angle2", "angle3")
 _AXES = ("rotaxis1", "rotaxis2", "rotaxis3")
 _CORNER = ("xmorig", "ymorig", "zmorig")
+_FAULTS = (InputError, MissingDependencyError, OSError, ValueError, EOFError, zlib.error)
+_HEAD = 1 << 16  # bytes in which the names of the columns are looked for
 _Z = 3  # the number of the z axis
 
 
@@ -60,8 +63,10 @@ def frame_in(path: str | Path) -> FoundFrame | None:
     if kind not in (".parquet", *TEXT_ENDINGS) or not path.is_file():
         return None
     try:
+        if kind in TEXT_ENDINGS and not kind.endswith(".gz") and not _may_hold(path):
+            return None
         source = ParquetSource(path) if kind == ".parquet" else CsvSource(path)
-    except (InputError, OSError, ValueError):  # the reader of the points raises the error
+    except _FAULTS:  # the reader of the points raises the error
         return None
     plain = [plain_name(name) for name in source.names]
     has_world = any(set(plain) >= set(world) for world in WORLD)
@@ -81,6 +86,13 @@ def frame_in(path: str | Path) -> FoundFrame | None:
             path, "has columns of a rotated model (X0, ANGLE1, ...) that vary or are empty"
         )
     return _frame(path, dict(zip(wanted, low.tolist(), strict=True)))
+
+
+def _may_hold(path: Path) -> bool:
+    """Return whether the name of an angle is in the first lines of a text."""
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD)
+    return b"angle1" in head.replace(b"\0", b"").lower()
 
 
 def _frame(path: Path, values: dict[str, float]) -> FoundFrame | None:

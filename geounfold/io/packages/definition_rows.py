@@ -119,10 +119,9 @@ def _with_micromine(
     if len(turned) == 6 < count and all(map(is_number, turned)):
         found += 1
         angles = ", ".join(turned[:3])
-        notes.append(
-            f"the row of the model's rotation left out (about z, x, y: {angles}); if the "
-            "coordinates are the model's own, give --origin and --rotation"
-        )
+        asked = "; if the coordinates are the model's own, give --origin and --rotation"
+        about = asked if any(float(angle.replace(",", ".")) for angle in turned[:3]) else ""
+        notes.append(f"the row of the model's rotation left out (about z, x, y: {angles}){about}")
     fault = ""
     if not re.search(r"cent", position, re.IGNORECASE):
         fault = (

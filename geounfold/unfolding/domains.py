@@ -23,6 +23,8 @@ from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.run import unfold
 
+_MOST = 1000  # domains of a run; models have tens, a column of grades thousands
+
 Progress = Callable[[str], None]
 
 
@@ -190,6 +192,7 @@ def unfold_domains(
     def run(rows: Ints, stage: Progress | None) -> Unfolding:
         return unfold(points.iloc[rows], options, progress=stage, **changes)
 
+    check_domains_named(codes, names, f"column '{by}'")
     results, failures, blocks = each_domain(codes, names, run, progress)
     part = parts_of_rows(codes, names, list(results), chosen)
     column = str(points.columns[position])
@@ -217,11 +220,6 @@ def each_domain(
         Returns the result of some rows (k,), given these and what to call at each stage.
     progress : callable, optional
         Called with every stage's name.
-
-    Raises
-    ------
-    InputError
-        No row has a domain.
     """
     results: dict[str, Any] = {}
     failures: dict[str, GeounfoldError] = {}
@@ -240,9 +238,20 @@ def each_domain(
             results[name] = run(rows, stage)
         except GeounfoldError as error:
             failures[name] = error
-    if not blocks:
-        raise InputError("no row has a value in the column of the domains")
     return results, failures, blocks
+
+
+def check_domains_named(codes: Ints, names: list[str], column: str) -> None:
+    """Raise InputError if no row has a domain, or if there are too many to be domains."""
+    count = len(np.unique(codes[codes >= 0]))
+    if not count:
+        raise InputError(f"{column} has no value in any row that is chosen")
+    if count > _MOST:
+        first = ", ".join(names[:3])
+        raise InputError(
+            f"{column} has {count} different values ({first}, ...): the domains of a model are "
+            f"{_MOST} at most; name the column of the domains"
+        )
 
 
 def parts_of_rows(codes: Ints, names: list[str], done: list[str], chosen: Any) -> Ints:

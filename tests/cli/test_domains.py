@@ -238,3 +238,21 @@ def test_holes_and_samples_without_the_column_are_told(
     assert set(found["DOMAIN"]) == {"SEAM"}
     flat = pd.read_csv(folder / "flat.csv").loc[seam.index, FLAT]
     np.testing.assert_array_equal(found[FLAT], flat)
+
+
+@pytest.mark.parametrize(
+    ("by", "message"),
+    [
+        ("DOMAN", "model.csv: no column 'DOMAN'; did you mean DOMAIN?"),
+        ("EMPTY", "model.csv: column 'EMPTY' has no value in any row that is chosen"),
+        ("ID", "column 'ID' has 1200 different values (0, 1, 2, ...)"),
+    ],
+)
+def test_columns_that_are_no_domains(by: str, message: str, tmp_path: Path, capsys) -> None:
+    frame = pd.DataFrame(grid_cells(20, 20, 3), columns=list("xyz"))
+    frame.assign(DOMAIN="A", EMPTY="", ID=np.arange(1200)).to_csv(
+        tmp_path / "model.csv", index=False
+    )
+    words = ["unfold", str(tmp_path / "model.csv"), "-o", str(tmp_path / "o.csv"), "--by", by]
+    assert main(words) == 2
+    assert message in capsys.readouterr().err

@@ -63,7 +63,12 @@ def unfold_by(
         All domains failed; nothing was written.
     """
     from geounfold.unfolding import run as unfolding
-    from geounfold.unfolding.domains import Domains, each_domain, parts_of_rows
+    from geounfold.unfolding.domains import (
+        Domains,
+        check_domains_named,
+        each_domain,
+        parts_of_rows,
+    )
 
     given = body.table
     table = given.table if isinstance(given, PartedTable) else given
@@ -75,6 +80,7 @@ def unfold_by(
     def run(rows: Ints, stage: Any) -> Any:
         return unfolding.unfold(table.points[rows], options, progress=stage)
 
+    check_domains_named(codes, names, f"{table.source}: column '{args.by}'")
     results, failures, blocks = each_domain(codes, names, run, console.stage)
     column = table.names[column_position(table.names, args.by, table.source)]
     part = parts_of_rows(codes, names, list(results), selected)

@@ -28,13 +28,13 @@ _EXACT = 2**24  # float32 holds whole numbers up to this exactly
 
 MEANINGS = {
     "stratigraphic": (
-        "stratigraphic coordinate",
+        "height in the layer",
         "0 at the bottom surface, 1 at the top surface",
         "viridis",
     ),
     "nmd_error": (
         "change of neighbour distances",
-        "epsilon(X, Y): relative change of the mean distance to the neighbours, folded to unfolded",
+        "relative change of the mean distance to the neighbouring blocks, folded to unfolded",
         "cividis",
     ),
     "volume_ratio": ("volume ratio", "unfolded over folded volume at the block", "diverging"),
@@ -42,12 +42,12 @@ MEANINGS = {
     "stretch_max": ("largest stretch", "largest principal stretch at the block", "diverging"),
     "stretch_min": ("smallest stretch", "smallest principal stretch at the block", "diverging"),
     "mesh_distance": (
-        "distance from the control mesh",
+        "distance from the map's cells",
         "0 for a block inside; in the input's unit",
         "cividis",
     ),
     "fault_block": ("fault block", "the block between faults that was unfolded by itself", ""),
-    "location": ("location", "inside the control mesh, or extrapolated by the shell around it", ""),
+    "location": ("location", "inside the map's cells, or extrapolated around them", ""),
     "nmd_folded": (
         "neighbour distance, folded",
         "mean distance to the neighbours, in the input's unit",

@@ -82,15 +82,15 @@ def _percent(share: float) -> str:
 
 
 _FIGURES: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
-    ("inverted_folded", "inverted tetrahedra, folded", number),
-    ("inverted_unfolded", "inverted tetrahedra, unfolded", number),
+    ("inverted_folded", "cells of the map inside out, folded", number),
+    ("inverted_unfolded", "cells of the map inside out, unfolded", number),
     ("injective", "proved one-to-one", number),
-    ("outside_share", "blocks outside the control mesh", lambda v: f"{v:.3%}"),
-    ("round_trip_max", "round trip, largest error (input's unit)", number),
+    ("outside_share", "blocks outside the map's cells", lambda v: f"{v:.3%}"),
+    ("round_trip_max", "largest miss, unfolded and folded again", number),
     ("nmd.mean", "change of neighbour distances, mean", _percent),
     ("nmd.p95", "change of neighbour distances, 95th percentile", _percent),
     ("volume_change.mean", "change of volume, mean", _percent),
-    ("edge_change.mean", "change of the mesh's edge lengths, mean", _percent),
+    ("edge_change.mean", "change of lengths in the map, mean", _percent),
     ("shear.max", "shear, largest", number),
     ("peak_memory_mb", "peak memory, MiB", lambda v: f"{v:,.0f}"),
 )
@@ -169,17 +169,17 @@ def _without(row: Mapping[str, Any], left_out: tuple[str, ...]) -> dict[str, Any
 
 _CERTIFICATE = {
     "injective": "proved one-to-one",
-    "tetrahedra": "tetrahedra checked",
+    "tetrahedra": "cells of the map checked",
     "boundary_faces": "border faces checked",
-    "glued": "tetrahedra glued face to face",
-    "inverted_folded": "inverted or flat tetrahedra, folded",
-    "inverted_unfolded": "inverted or flat tetrahedra, unfolded",
+    "glued": "cells joined face to face",
+    "inverted_folded": "cells inside out or flat, folded",
+    "inverted_unfolded": "cells inside out or flat, unfolded",
     "crossing_folded": "pairs of border faces that cross, folded",
     "crossing_unfolded": "pairs of border faces that cross, unfolded",
     "nested_folded": "parts of the border inside out, folded",
     "nested_unfolded": "parts of the border inside out, unfolded",
-    "faulty_elements": "tetrahedra at fault",
-    "blocks_in_faulty_elements": "blocks in tetrahedra at fault",
+    "faulty_elements": "cells at fault",
+    "blocks_in_faulty_elements": "blocks in cells at fault",
     "theorem": "theorem",
 }
 
@@ -199,16 +199,16 @@ _MADE = {
     "hull.reason": "why this hull",
     "hull.volume": "volume of the hull",
     "hull.blocks_volume": "volume of the blocks",
-    "control_mesh.vertices": "vertices of the control mesh",
-    "control_mesh.tetrahedra": "tetrahedra of the control mesh",
-    "control_mesh.volume_folded": "volume of the control mesh, folded",
-    "control_mesh.volume_unfolded": "volume of the control mesh, unfolded",
-    "outside.reach": "extrapolation reaches from the control mesh",
+    "control_mesh.vertices": "corners of the map's cells",
+    "control_mesh.tetrahedra": "cells of the map",
+    "control_mesh.volume_folded": "volume of the map, folded",
+    "control_mesh.volume_unfolded": "volume of the map, unfolded",
+    "outside.reach": "extrapolation reaches from the map's cells",
 }
 _METHOD = {
     "merged": "blocks merged along each axis",
-    "rung": "control mesh, repair used",
-    "rungs": "control mesh, repairs tried",
+    "rung": "repair of the map used",
+    "rungs": "repairs of the map tried",
     "roughness": "roughness of the mid surface",
     "smoothing": "smoothing of the mid surface",
     "accepted_samples": "share of samples that the mid surface fits",

@@ -14,12 +14,11 @@ _SWOLLEN = 0.05  # change of volume above which tonnages need a weight
 _STRETCHED = 0.005  # edge strain of a flattened surface above which it is not developable
 
 _RUNGS = {
-    "capped": "the height of the control mesh was limited where the fold is tighter than half the "
-    "thickness",
-    "blended": "the height of the control mesh was reduced where normals of the mid surface cross",
-    "refined": "the control mesh needed finer cells and layers to follow the fold",
-    "untangled": "some vertices of the control mesh were moved to turn inverted tetrahedra upright",
-    "shrunk": "the height of the control mesh was reduced until no tetrahedron was inverted",
+    "capped": "the map reaches less far out where the fold is tighter than half the thickness",
+    "blended": "the map reaches less far out where lines across the layer would cross",
+    "refined": "the fold is so tight that the map needed finer cells",
+    "untangled": "some cells of the map were moved, because they were turned inside out",
+    "shrunk": "the map reaches less far out, because cells there were turned inside out",
 }
 
 
@@ -65,7 +64,7 @@ def _headline(summary: Mapping[str, Any]) -> tuple[str, str]:
     if proved is False and mapping(summary.get("certificate")).get("injective") is True:
         return (
             "care",
-            "Usable: the tetrahedra are one-to-one; inside the prisms nothing is proved.",
+            "Usable: the cells of the map are one-to-one; between their corners nothing is proved.",
         )
     if proved is False:
         return "bad", "The map is not proved one-to-one: do not use it as it is."
@@ -82,26 +81,26 @@ def _headline(summary: Mapping[str, Any]) -> tuple[str, str]:
         blocks = _count(summary["torn"], "block")
         return "care", f"Usable with care: {blocks} moved away from blocks that they touched."
     if proved is not True:
-        return "care", "Usable: no tetrahedron is inverted, but the map is not proved one-to-one."
+        return "care", "Usable: no cell of the map is inside out, but it is not proved one-to-one."
     return "good", "Sound: the map is proved one-to-one."
 
 
 def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
     folded, unfolded = summary.get("inverted_folded"), summary.get("inverted_unfolded")
     if folded is not None and unfolded is not None:
-        yield f"Inverted tetrahedra: {folded} in the folded space, {unfolded} in the unfolded one."
+        yield f"Cells of the map turned inside out: {folded} folded, {unfolded} unfolded."
     certificate = mapping(summary.get("certificate"))
     if certificate.get("injective") is True:
         yield (
-            f"Proved: {number(certificate['tetrahedra'])} tetrahedra, none inverted, and "
-            f"{number(certificate['boundary_faces'])} border faces, none crossing, in both spaces, "
-            "by exact predicates; so their map is one-to-one (Lipman 2014)."
+            f"Proved: no two places become one. All {number(certificate['tetrahedra'])} cells of "
+            f"the map keep their sense and its {number(certificate['boundary_faces'])} border "
+            "faces do not cross, in both spaces, checked without rounding (Lipman 2014)."
         )
         used = mapping(summary.get("coordinates")).get("name", "tet")
         if used != "tet":
             yield (
-                f"Not proved: inside the prisms, points are carried by {used} coordinates of the "
-                "corners, not by the tetrahedra. Checked at the blocks only: every block returns, "
+                f"Not proved: inside the cells, points are carried by {used} coordinates of the "
+                "corners. Checked at the blocks only: every block returns, "
                 "and none is turned inside out."
             )
     elif certificate.get("reason"):
@@ -110,7 +109,7 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
         yield (
             f"Not proved: {number(certificate['crossing_folded'])} pairs of border faces cross in "
             f"the folded space, {number(certificate['crossing_unfolded'])} in the unfolded one; "
-            f"{number(certificate['blocks_in_faulty_elements'])} blocks lie in tetrahedra at fault "
+            f"{number(certificate['blocks_in_faulty_elements'])} blocks lie in cells at fault "
             "(listed below, and marked in the mesh that --mesh writes)."
         )
     empty = mapping(summary.get("outside")).get("empty")
@@ -119,10 +118,10 @@ def _reasons(summary: Mapping[str, Any]) -> Iterator[str]:
     outside = summary.get("outside_share")
     if outside is not None:
         share = "every block" if outside == 0 else f"all blocks but {outside:.3%}"
-        yield f"The control mesh holds {share}."
+        yield f"The map covers {share}; what lies around it is extrapolated."
     if summary.get("round_trip_max") is not None:
         yield (
-            "Blocks inside, carried to the flat space and back, move by at most "
+            "Blocks that are unfolded and folded again miss their place by at most "
             f"{number(summary['round_trip_max'])} (input's unit)."
         )
     error = summary.get("nmd")
@@ -162,14 +161,14 @@ def _places_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
     faulty = certificate.get("blocks_in_faulty_elements")
     if faulty:
         yield (
-            f"{_count(faulty, 'block')} in tetrahedra at fault: their coordinates may belong to "
+            f"{_count(faulty, 'block')} in cells at fault: their coordinates may belong to "
             "two places. Leave them out, or unfold the body without the part around them."
         )
     outside = mapping(summary.get("outside"))
     if outside.get("extrapolated"):
         yield (
-            f"{_count(outside['extrapolated'], 'block')} marked extrapolated: carried by a shell "
-            "around the control mesh, up to "
+            f"{_count(outside['extrapolated'], 'block')} marked extrapolated: they lie outside the "
+            "map's own cells, up to "
             f"{number(float(outside.get('largest_distance', 0.0)))} from it (input's unit)."
         )
     if outside.get("empty"):
@@ -191,7 +190,7 @@ def _shapes_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
         yield (
             f"Distances between neighbours change by more than {_BENT:.0%} for over one block in "
             f"twenty (at most {error['max']:.0%}). Both slip between layers and distortion cause "
-            "this: compare nmd_error with shear in the pictures. Where only nmd_error is high, "
+            "this: compare the colours nmd_error and shear. Where only nmd_error is high, "
             "ranges of variograms are wrong."
         )
     volume = mapping(summary.get("volume_change"))
@@ -204,7 +203,7 @@ def _shapes_to_distrust(summary: Mapping[str, Any]) -> Iterator[str]:
     method = mapping(summary.get("method"))
     rung = method.get("rung")
     if isinstance(rung, str) and rung != "constant":
-        what = _RUNGS.get(rung, f"the control mesh had to be repaired (rung '{rung}')")
+        what = _RUNGS.get(rung, f"the map had to be repaired ('{rung}')")
         yield f"{what[0].upper()}{what[1:]}: layers near there follow the fold less exactly."
     if isinstance(summary.get("bodies"), int) and summary["bodies"] > 1:
         yield (
@@ -237,7 +236,7 @@ def _holes_to_distrust(holes: Mapping[str, Any]) -> Iterator[str]:
     if found.get("extrapolated") or found.get("outside"):
         yield (
             f"Of {number(found['points'])} points of the drill-holes' {name}, "
-            f"{number(found.get('extrapolated', 0))} lie outside the control mesh (marked "
+            f"{number(found.get('extrapolated', 0))} lie outside the map's cells (marked "
             f"extrapolated) and {number(found.get('outside', 0))} beyond the map's reach (no flat "
             "image). The farther out, the less reliable they are."
         )

@@ -132,8 +132,8 @@ def test_the_verdict_follows_the_worst_thing_known(change, level, said):
 def test_other_coordinates_are_told_from_what_is_proved():
     facts = {"injective": False, "certificate": PROVED, "coordinates": {"name": "mvc"}}
     reasons = verdict(SOUND | facts).reasons
-    assert any(r.startswith("Proved: 6 tetrahedra") for r in reasons)
-    assert any(r.startswith("Not proved: inside the prisms") and "mvc" in r for r in reasons)
+    assert any(r.startswith("Proved: no two places become one. All 6 cells") for r in reasons)
+    assert any(r.startswith("Not proved: inside the cells") and "mvc" in r for r in reasons)
 
 
 @needs_rendering
@@ -167,11 +167,11 @@ def test_elements_at_fault_are_listed_with_their_places():
         ({"flattening": {"mid": {"edge_strain": [0.02]}}}, "change by 2.0%"),
         ({"flattening": {"top": {"flips": 4, "overlaps": 1}}}, "4 flips and 1 overlaps"),
         ({"flattening": {"mid": {"stop": "max_iter"}}}, "before it converged (max_iter)"),
-        ({"method": {"rung": "capped"}}, "The height of the control mesh was limited"),
-        ({"method": {"rung": "new"}}, "(rung 'new')"),
+        ({"method": {"rung": "capped"}}, "The map reaches less far out where the fold is tighter"),
+        ({"method": {"rung": "new"}}, "repaired ('new')"),
         ({"bodies": 2}, "2 bodies were unfolded one by one"),
         ({"input": {"dropped_invalid": 5}}, "5 rows of the input left out"),
-        ({"certificate": {"blocks_in_faulty_elements": 8}}, "8 blocks in tetrahedra at fault"),
+        ({"certificate": {"blocks_in_faulty_elements": 8}}, "8 blocks in cells at fault"),
         (
             {"drillholes": {"samples": {"points": 9, "extrapolated": 4, "outside": 1}}},
             "Of 9 points of the drill-holes' samples, 4 lie outside",

@@ -10,6 +10,8 @@ import numpy as np
 from geounfold.body.fault_cells import FaultCells
 from geounfold.body.prepare import PreparedPoints
 from geounfold.body.working_frame import Frame
+from geounfold.faults.result import FaultedBody
+from geounfold.faults.trust import with_fault_reasons
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.mapping.carried import Carried, Returned, few
 from geounfold.mapping.certificate import Certificate, certify, certify_parts
@@ -64,6 +66,7 @@ def measure(
     fits: Sequence[BodyFit],
     options: UnfoldOptions,
     stage: Stage,
+    faulted: FaultedBody | None = None,
 ) -> Measured:
     """Carry the points by a map, and check and measure the answer.
 
@@ -93,6 +96,8 @@ def measure(
     check_torn(torn, P, options)
     with stage("trust"):
         trust = _trust(mapping, prepared, fits, carried)
+        if faulted is not None:
+            trust = with_fault_reasons(trust, faulted)
     check_trust(trust, options)
     return Measured(carried, returned, certificate, quality, torn, trust)
 

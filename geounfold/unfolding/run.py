@@ -206,7 +206,7 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
             parts=parts,
             body=_body_cells(prepared),
         )
-    measured = measure(mapping, prepared, fits, options, clock.stage)
+    measured = measure(mapping, prepared, fits, options, clock.stage, found)
     return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found)
 
 

@@ -143,3 +143,18 @@ def test_fault_blocks_are_checked():
         gu.unfold(X, fault_blocks=np.arange(len(X)))
     with pytest.raises(InputError, match="there is no column 'ids'"):
         gu.unfold(X, fault_blocks="ids")
+
+
+def test_strike_slip_that_nothing_marks_is_told(slab):
+    *_, u = slab
+    # The slab's ends lie in one plane on both sides of the fault, as those of a cropped model do.
+    assert not u.faults["slip_known"][0]
+    assert any("nothing marks the slip along strike" in r.what for r in u.trust.reasons)
+    assert u.trust.word in ("fair", "poor")
+
+
+def test_a_given_direction_settles_the_slip():
+    X, *_, surface = faulted_slab()
+    u = gu.unfold(X, faults={"F1": surface}, slip_direction={"F1": (90, 45)})
+    assert u.faults["resolved_by"][0] == "given"
+    assert u.faults["slip_known"][0]

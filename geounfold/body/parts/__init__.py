@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.parts.junctions import find_junctions
 from geounfold.body.parts.labels import in_pieces, label_cells
 from geounfold.body.parts.rays import medial_points
@@ -20,6 +21,17 @@ from geounfold.body.parts.result import Junction, SheetParts
 from geounfold.body.parts.sheets import find_sheets
 from geounfold.body.parts.voxels import Voxels
 from geounfold.geometry.mesh import Floats, Ints
+
+_LAYERS = 8.0
+"""Thickness of a body, in merged cells, from which these decide whether it is one sheet.
+
+The rules' thresholds were set on sheets of 4 to 12 cells. Merged cells find as many sheets as
+single ones in six bodies of the field suite whose cells were divided in 8 and in 64. A sheet of
+two cells can be found, so one a quarter as thick as the body's mean is not missed.
+"""
+
+_SLANT = 1.5
+"""Mean over all directions of |nx| + |ny| + |nz|: faces of cells per unit of a smooth surface."""
 
 __all__ = ["Junction", "SheetParts", "sheet_parts"]
 
@@ -40,6 +52,11 @@ def sheet_parts(cells: Ints, steps: Floats) -> SheetParts:
     SheetParts
         With one part, and no junctions, for a body of one sheet or of none that is recognised.
     """
+    merge = _merge(cells, steps)
+    if merge > 1:
+        merged = sheet_parts(_merged(cells, merge), steps)
+        if merged.count == 1 and not merged.junctions:
+            return _one(len(cells), merge * float(merged.thickness[0]))
     body = Voxels.of(cells, steps)
     rays = medial_points(body)
     if not len(rays.thickness):
@@ -53,6 +70,27 @@ def sheet_parts(cells: Ints, steps: Floats) -> SheetParts:
     table, sheet = in_pieces(label_cells(body, sheets), sheets.count)
     junctions = find_junctions(table, body, sheets, sheet)
     return SheetParts(table[tuple(body.cells.T)], sheets.thickness[sheet], junctions)
+
+
+def _merge(cells: Ints, steps: Floats) -> int:
+    """Return how many cells along each axis may be one, so that the body is _LAYERS of them thick.
+
+    The mean thickness is the volume over half the surface; faces of cells have 1.5 times the area
+    of a smooth surface in the mean over all directions.
+    """
+    occupied = OccupiedCells.of(cells)
+    open_faces = [
+        2 * (len(occupied.keys) - int(occupied.occupied(occupied.keys + int(step)).sum()))
+        for step in occupied.stride
+    ]
+    surface = float(np.array(open_faces) @ (1 / steps)) / _SLANT
+    return max(1, int(2 * len(occupied.keys) / surface / float(steps.max()) / _LAYERS))
+
+
+def _merged(cells: Ints, merge: int) -> Ints:
+    """Return the merged cells of which at least half is filled, (k, 3)."""
+    every, count = np.unique((cells - cells.min(axis=0)) // merge, axis=0, return_counts=True)
+    return every[2 * count >= merge**3]
 
 
 def _one(count: int, thickness: float) -> SheetParts:

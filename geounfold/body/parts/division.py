@@ -91,7 +91,7 @@ def divide(bodies: Sequence[Floats], frame: Frame) -> Division | None:
     """
     if frame.steps is None:
         return None
-    shells, owners, thickness, labels = [], [], [], []
+    thickness, labels, found_in = [], [], []
     body: list[int] = []
     junctions: list[Junction] = []
     for number, points in enumerate(bodies):
@@ -103,16 +103,19 @@ def divide(bodies: Sequence[Floats], frame: Frame) -> Division | None:
             return None  # sheets one block thick have no rays across them
         found = sheet_parts(occupied.cells_of(occupied.keys), frame.steps)
         own = _joined(occupied, found.labels, frame.steps) + len(body)
-        shell = _at_surface(occupied, own)
-        shells.append(occupied.cells_of(occupied.keys[shell]))
-        owners.append(own[shell])
+        found_in.append((occupied, own))
         labels.append(own[row])
         junctions += [_in_data(j, frame, len(body)) for j in found.junctions]
         body += [number] * found.count
         thickness.append(found.thickness * frame.scale)
     if not junctions:
         return None
-    surface = PartCells(np.concatenate(shells), np.concatenate(owners), frame.steps)
+    shells = [(cells, own, _at_surface(cells, own)) for cells, own in found_in]
+    surface = PartCells(
+        np.concatenate([cells.cells_of(cells.keys[shell]) for cells, _, shell in shells]),
+        np.concatenate([own[shell] for _, own, shell in shells]),
+        frame.steps,
+    )
     return Division(
         surface, tuple(labels), np.array(body), np.concatenate(thickness), tuple(junctions)
     )

@@ -174,6 +174,13 @@ CRITERIA = (
         below=True,
     ),
     Criterion(
+        "rough",
+        0.05,
+        0.05,
+        "top and bottom are rough: their levels are {:.0%} of the thickness off in the mean",
+        "smooth the body's surfaces, or take its layers to be no nearer than that",
+    ),
+    Criterion(
         "ends",
         0.05,
         NEVER,

@@ -119,7 +119,9 @@ def _thrust(
     lift = thick * np.clip((overlap / 2 + ramp - x) / ramp, 0, 1)
     upper = (t > lift) & (t < lift + thick) & (x > -overlap / 2)
     lower = (t > 0) & (t < thick) & (x < overlap / 2)
-    return space.body((upper, (t - lift) / thick), (lower, t / thick))
+    blocks = thick / float(space.steps[2])
+    thinnest = blocks if blocks < 5 else np.inf
+    return space.body((upper, (t - lift) / thick), (lower, t / thick), thinnest=thinnest)
 
 
 def _body(name: str, family: str, builder: partial[FieldBlocks], about: str) -> FieldBody:

@@ -222,8 +222,8 @@ def test_mended_of_nothing():
 
 def test_body_of_which_much_is_left_out_is_refused():
     place = MendedPlace("smoothed", 4, (10.0, 20.0, 30.0))
-    found = record(filled=3, cut=2, smoothed=4, places=(place,))
-    with pytest.raises(NoSheetError, match=r"6 of 100 blocks left out, most around \(10, 20, 30\)"):
+    found = record(filled=3, cut=3, smoothed=4, places=(place,))
+    with pytest.raises(NoSheetError, match=r"7 of 100 blocks left out, most around \(10, 20, 30\)"):
         found.check()
 
 

@@ -16,6 +16,7 @@ from geounfold.geometry.mesh import Floats
 from geounfold.quality.trust import Trust, grade, judge, measure_signs, score
 from geounfold.quality.trust.judge import CRITERIA, NEVER, Criterion
 from geounfold.quality.trust.signs import Signs
+from geounfold.synthetic.field_bodies import FIELD_BODIES
 from tests.shapes import box, turned
 
 THICKNESS = 6.0
@@ -111,6 +112,14 @@ def test_bulge_is_right_because_a_second_finish_is_tried() -> None:
     assert off < 0.05
 
 
+# A noisy grade shell: its levels are 0.06 off, and its hull's 0.15; a smooth lens's are 0.04 off.
+def test_rough_top_and_bottom_are_poor() -> None:
+    trust = gu.unfold(FIELD_BODIES["lens_shell_rough"].blocks(1).points).trust
+    assert trust is not None
+    assert trust.word == "poor"
+    assert trust.reasons[0].what.startswith("top and bottom are rough")
+
+
 def test_motion_and_order_of_rows_leave_the_word_and_move_the_place() -> None:
     points = faulted(0.8 * THICKNESS)
     order = np.random.default_rng(3).permutation(len(points))
@@ -173,6 +182,7 @@ def _signs(**changes: float) -> Signs:
         level=0.0,
         step=0.0,
         breadth=8.0,
+        rough=0.0,
         thickness=5.0,
         lost=0.0,
         places={},

@@ -117,7 +117,13 @@ def _trust(
     if isinstance(mapping, PointwiseMap):
         return None
     frame = prepared.frame
-    signs = [fit.signs or _signs_of(fit, mapping, frame) for fit in fits]
+    signs = [
+        replace(
+            fit.signs or _signs_of(fit, mapping, frame),
+            strays=0.0 if fit.hull is None or frame.steps is None else fit.hull.strays,
+        )
+        for fit in fits
+    ]
     kind = "body" if prepared.division is None else "part"
     if mapping.parts is not None and isinstance(mapping.parts.cells, FaultCells):
         kind = "fault block"

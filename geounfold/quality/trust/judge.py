@@ -181,6 +181,13 @@ CRITERIA = (
         "smooth the body's surfaces, or take its layers to be no nearer than that",
     ),
     Criterion(
+        "strays",
+        0.01,
+        0.02,
+        "the body is ragged: {:.1%} of its blocks lie more than a block outside a smooth surface",
+        "model the domain with a smoother boundary, or take its layers to be no nearer than that",
+    ),
+    Criterion(
         "ends",
         0.05,
         NEVER,

@@ -94,6 +94,8 @@ class Signs:
         Median thickness, in blocks.
     lost : float
         Share of the hull's area that the map does not carry.
+    strays : float
+        Share of the blocks more than a block outside of the smooth hull that they do not fit.
     places : dict of Place
         Where the signs are found, by their names.
     """
@@ -108,6 +110,7 @@ class Signs:
     thickness: float
     lost: float
     places: dict[str, Place]
+    strays: float = 0.0
 
     def figures(self) -> dict[str, float | None]:
         """Return the figures by name, for the summary; None if one was not measured."""

@@ -96,6 +96,7 @@ def _first_suitable(
     makers: dict[str, Maker], points: Floats, sides: Floats, options: HullOptions
 ) -> Hull:
     refused: list[str] = []
+    strays = 0.0
     for name, make in makers.items():
         try:
             hull = make(points, sides, options)
@@ -108,8 +109,11 @@ def _first_suitable(
             chosen = (
                 f"{name}: closed, manifold, {ratio:.2f} of the blocks' volume, holds the points"
             )
-            return replace(hull, reason="; ".join([*refused, chosen]))
+            return replace(hull, reason="; ".join([*refused, chosen]), strays=strays)
         refused.append(f"{name}: {fault}")
+        if name == "density":
+            share = _strays(hull, points)
+            strays = share if share > STRAYS else 0.0
     raise HullError("no hull is suitable (" + "; ".join(refused) + ")")
 
 
@@ -120,8 +124,7 @@ def unsuitability(hull: Hull, points: Floats) -> str:
     centroids, which runs half a block inside.  At most 1 % of the points may lie more than a block
     outside.
     """
-    sample = points[:: 1 + len(points) // SAMPLE]
-    outside = float(np.mean(_outside_by(hull, sample) > 1.0))
+    outside = _strays(hull, points)
     if outside > STRAYS:
         return f"{outside:.1%} of the points lie more than a block outside"
     skin = triangle_areas(hull.mesh.V, hull.mesh.F).sum() * hull.inset
@@ -129,6 +132,12 @@ def unsuitability(hull: Hull, points: Floats) -> str:
     if not VOLUMES[0] <= ratio <= VOLUMES[1]:
         return f"it encloses {ratio:.2f} times the blocks' volume"
     return ""
+
+
+def _strays(hull: Hull, points: Floats) -> float:
+    """Return the share of points that lie more than a block outside."""
+    sample = points[:: 1 + len(points) // SAMPLE]
+    return float(np.mean(_outside_by(hull, sample) > 1.0))
 
 
 def _outside_by(hull: Hull, points: Floats) -> Floats:

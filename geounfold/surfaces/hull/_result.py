@@ -39,6 +39,9 @@ class Hull:
         blocks' sides differ.
     reason : str
         Reason for the method if the choice was automatic; else empty.
+    strays : float
+        Share of the blocks that lie more than a block outside the blurred density's surface, if
+        the automatic choice passed that over because of them; else 0.
     """
 
     mesh: TriMesh
@@ -50,6 +53,7 @@ class Hull:
     dropped: int = 0
     even: bool = False
     reason: str = ""
+    strays: float = 0.0
 
     def __repr__(self) -> str:
         """Return one line: the method, faces, and both volumes in blocks."""

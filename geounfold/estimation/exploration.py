@@ -13,6 +13,7 @@ from geounfold.errors import InputError, OptionError
 from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples
 from geounfold.geometry.mesh import Floats, Ints
+from geounfold.io.grade_values import GradeRules, grade_rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +79,7 @@ def explore(
     hole: str | None = None,
     layers: int = 10,
     bins: int = 30,
+    values: GradeRules | Mapping[str, Any] | None = None,
 ) -> Exploration:
     """Return the tables of exploratory data analysis of one grade, in both spaces.
 
@@ -95,6 +97,8 @@ def explore(
         Number of slices of equal stratigraphic height from bottom to top.
     bins : int
         Number of bins of the histogram and of each swath.
+    values : GradeRules or mapping, optional
+        How the grade's values are read, as `estimate` takes it.
 
     Raises
     ------
@@ -106,7 +110,8 @@ def explore(
     for name, value in (("layers", layers), ("bins", bins)):
         if not isinstance(value, int) or value < 1:
             raise OptionError(f"{name} must be a whole number of 1 or more, not {value!r}")
-    flat = flat_samples(getattr(unfolding, "map", unfolding), samples, grade=grade, hole=hole)
+    carrier = getattr(unfolding, "map", unfolding)
+    flat = flat_samples(carrier, samples, grade=grade, hole=hole, rules=grade_rules(values))
     s, v = flat.stratigraphic, flat.grades
     places = {"x": flat.points[:, 0], "y": flat.points[:, 1], "stratigraphic": s}
     return Exploration(

@@ -234,6 +234,8 @@ def arrays_of(content: bytes, path: Path) -> Arrays:
             names = [n for n in ARRAYS if n not in late]
             _check_names({*members}, {f"{n}.npy" for n in (*_HEAD, *names)}, str(path))
             rest = {n: _array(archive, members, n, path) for n in ("checksum", *names)}
+    except InputError:  # a ValueError too
+        raise
     except _DAMAGE as error:
         raise InputError(f"{path}: not a geounfold map, or a damaged one; save it again") from error
     stored = rest.pop("checksum")

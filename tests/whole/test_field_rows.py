@@ -157,6 +157,7 @@ def test_16_projects_of_several_elements_are_not_guessed(capsys) -> None:
         assert run("unfold", folder / name, "-o", "o.csv") == 2
         said = capsys.readouterr().err
         assert f"{words}; choose one by --element NAME" in said
+        assert "damaged" not in said
     assert len(read_points(folder / "proj.omf", element="ore block model")) == 8000
     assert run("unfold", folder / "several.omf", "--element", "blocks", "-o", "o.csv") == 0
     assert len(pd.read_csv("o.csv")) == BLOCKS

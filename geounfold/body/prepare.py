@@ -10,7 +10,7 @@ import numpy as np
 from geounfold.body.check import check_points, check_units
 from geounfold.body.coarsest_cells import coarsest_cells
 from geounfold.body.fault_surface import FaultWalls
-from geounfold.body.lattice import Lattice, distinct, measure_lattice
+from geounfold.body.lattice import Lattice, distinct, measure_lattice, refined
 from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending.mend import WORDS, Mended
 from geounfold.body.mending.record import MendedPlace, places_of
@@ -19,7 +19,7 @@ from geounfold.body.parts.division import Division, divide
 from geounfold.body.rounded import unrounded
 from geounfold.body.scattered import QUIET, unevenness
 from geounfold.body.separate import select_body, separate_bodies
-from geounfold.body.sub_blocks import filled_cells
+from geounfold.body.sub_blocks import FilledCells, filled_cells
 from geounfold.body.working_frame import Frame, working_frame
 from geounfold.geometry.mesh import Floats, Ints, TriMesh
 
@@ -148,7 +148,7 @@ def prepare(
     told, points = points, unrounded(points)
     lattice = measure_lattice(points)
     check_units(points, lattice)
-    cells = filled_cells(points, lattice)
+    cells = _filled(points, lattice)
     if cut is None:  # faults cut between single blocks
         cells = coarsest_cells(points, lattice, cells)
     filled, lattice = (points, lattice) if cells is None else (cells.points, cells.lattice)
@@ -176,6 +176,15 @@ def prepare(
         points, given, frame, lattice, groups, record, cells=taken, moved=moved
     )
     return _divided(prepared, bodies) if parts else (prepared, bodies)
+
+
+def _filled(points: Floats, lattice: Lattice | None) -> FilledCells | None:
+    """Return the cells that blocks fill, few sub-blocks off the others' lattice included."""
+    if lattice is not None and lattice.share < 1:
+        found = filled_cells(points, refined(points, lattice))
+        if found is not None and found.sub_blocked:
+            return found
+    return filled_cells(points, lattice)
 
 
 def _mended(

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from geounfold.body.coarsest_cells import coarsest_cells
-from geounfold.body.lattice import measure_lattice
+from geounfold.body.lattice import measure_lattice, refined
+from geounfold.body.prepare import prepare
 from geounfold.body.sub_blocks import FilledCells, filled_cells
 from geounfold.geometry.mesh import Floats
 from tests.shapes import grid_cells
@@ -97,3 +98,19 @@ def test_one_row_of_sub_blocks_on_an_edge(axis: int, parts: tuple[int, int, int]
     # More than 250,000 quarters are joined to halves; a layer of quarters is then half a half.
     joined = parts[axis] == 4
     assert volume == pytest.approx(wanted, rel=0.015 if joined else 1e-9)
+
+
+def test_a_handful_of_sub_blocks_off_the_lattice_of_the_others_is_filled_too() -> None:
+    """Three of 1,800 blocks are split in 8: 1.3 % of the centroids, few enough to be noise."""
+    k = grid_cells(30, 20, 3)
+    corner = (k[:, 0] == 0) & (k[:, 1] == 0)
+    points = np.concatenate([k[~corner] * SIDE, split(k[corner] * SIDE, (2, 2, 2))])
+    lattice = measure_lattice(points)
+    assert lattice is not None
+    assert 0.97 < lattice.share < 1
+    assert refined(points, lattice).steps.tolist() == [SIDE / 4] * 3  # parts' centres
+    (body,) = prepare(points)[1]
+    assert len(body.fitted) == 8 * len(k)
+    assert len(body.blocks) == len(points)
+    # A point that lies anywhere else leaves the lattice as it is.
+    assert refined(np.concatenate([points, [[3.3, 7.1, 11.7]]]), lattice) is lattice

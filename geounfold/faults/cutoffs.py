@@ -116,7 +116,8 @@ def cutoff(block: BlockMap, fine: FaultSurface) -> Cutoff | None:
     if np.count_nonzero(index == MIDDLE) < _FEWEST:
         return None  # the fault ends inside the layer, or runs along it
     Y, T = smoothed(Y, T, length, index)
-    seen = fine.sides(block.points)
+    away = cKDTree(fine.V).query(block.points, distance_upper_bound=3.0)[0]
+    seen = fine.sides(block.points[away < 3.0])  # most blocks are far, and slow to look up
     side = float(np.sign(np.sign(seen.signed[seen.distance < 2]).sum()))
     return Cutoff(Y, X, T, length, index, side) if side else None
 

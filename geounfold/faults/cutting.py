@@ -84,6 +84,20 @@ def neighbours(points: Floats, frame: Frame) -> Ints:
     return np.concatenate(found)
 
 
+def crossing_pairs(
+    points: Floats, surfaces: Sequence[FaultSurface], frame: Frame
+) -> tuple[Ints, Bools, Floats]:
+    """Return pairs of neighbours, which of them surfaces part, and distances from these."""
+    pairs = neighbours(points, frame)
+    side = 1.0 if frame.sides is None else float(max(frame.sides))
+    parted, nearest = np.zeros(len(pairs), dtype=bool), np.full(len(points), np.inf)
+    for surface in surfaces:
+        seen = surface.sides(points)
+        parted |= _crossing(points, pairs, seen, side)
+        nearest = np.minimum(nearest, seen.distance)
+    return pairs, parted, nearest
+
+
 def cut_blocks(
     points: Floats, surfaces: Sequence[FaultSurface], frame: Frame, least: int = CRUMB
 ) -> FaultCut:

@@ -27,6 +27,7 @@ from geounfold.faults.cutting import (
 from geounfold.faults.from_blocks import layer_normals, surfaces_between
 from geounfold.faults.given import MOST, FaultsGiven
 from geounfold.faults.joints import Joint, facing, first_poses
+from geounfold.faults.moved import moved_onto_blocks
 from geounfold.faults.outline import Outlines
 from geounfold.faults.poses import PoseRules, view
 from geounfold.faults.result import FaultedBody, FaultFit
@@ -70,6 +71,8 @@ class Faulting:
         self.surfaces = self.given.in_work(cells.frame)
         self._check_near(points)
         if self.given.blocks is None:
+            self.surfaces, told = moved_onto_blocks(points, self.surfaces, cells.frame)
+            self.notes += told
             self._cut = cut_blocks(points, self.surfaces, cells.frame, CRUMB)
             self._check_cut()
         else:

@@ -33,6 +33,10 @@ def with_fault_reasons(trust: Trust | None, found: FaultedBody) -> Trust | None:
                 "poor",
             )
         )
+    if len(set(found.groups)) > 1:
+        what = f"the fault blocks form {len(set(found.groups))} groups that no fault joins"
+        do = "compare the fault surfaces with the blocks, or extend them"
+        told.append(Reason(what, None, 0, do, "poor"))
     every = sorted((*trust.reasons, *told), key=lambda reason: -WORDS.index(reason.word))
     return Trust(every[0].word if every else trust.word, tuple(every))
 

@@ -186,14 +186,13 @@ def throw_off(table: list[dict[str, Any]], body: Any, found: np.ndarray) -> floa
     true = {int(k): int(np.bincount(body.fault_block[found == k]).argmax())
             for k in np.unique(found[found >= 0])}  # fmt: skip
     errors = []
+    blocks = np.concatenate([slip.blocks for slip in body.slips.values()])
+    throw = np.concatenate([slip.throw for slip in body.slips.values()])
     for row in table:
-        slip = body.slips.get(row["fault"])
-        if slip is None or row["throw"] is None:
-            continue
         pair = [true.get(row[wall]) for wall in ("footwall_block", "hanging_wall_block")]
-        rows = (slip.blocks == pair).all(axis=1)
-        if rows.sum() >= 10:
-            errors.append(abs(row["throw"] - float(np.median(slip.throw[rows]))) / body.step)
+        rows = (blocks == pair).all(axis=1)
+        if row["throw"] is not None and rows.sum() >= 10:
+            errors.append(abs(row["throw"] - float(np.median(throw[rows]))) / body.step)
     return max(errors, default=NAN)
 
 

@@ -95,7 +95,7 @@ def check_units(points: Floats, lattice: Lattice | None) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     extent = high - low
     far = np.abs(points).max(axis=0)
-    tall = extent[2] / max(float(extent[:2].max()), np.finfo(float).tiny)
+    tall = float(extent[2] / extent[:2].max()) if extent[:2].any() else 0.0
     steps = None if lattice is None else np.abs(lattice.steps @ np.abs(lattice.axes))
     if steps is not None:
         tall = max(tall, float(steps[2] / steps[:2].max()))

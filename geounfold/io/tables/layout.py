@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 
 import pandas as pd
@@ -153,7 +153,8 @@ class _Names:
 def _layout(path: Path, rows: list[_Line], names: _Names, columns: Triple | None) -> TextLayout:
     """Return the layout below the row of names."""
     below = [line for line in rows[names.row + 1 :] if line.number > names.last.number]
-    fields = [split(line.text, names.separator) for line in below[: 4 * _NEXT]]
+    whole = list(takewhile(lambda line: line.text.count('"') % 2 == 0, below[: 4 * _NEXT]))
+    fields = [split(line.text, names.separator) for line in whole]
     where = _where(names.fields, columns) if names.coordinates else ()
     left_out = definition_rows(fields[: 2 * _NEXT], where, len(names.fields))
     if left_out.fault:

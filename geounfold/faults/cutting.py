@@ -18,8 +18,7 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 CRUMB = 50
 """Number of blocks below which a piece is a crumb of the staircase along a fault.
 
-Measured: crumbs of 18 designed bodies have up to 20 blocks; 5 to 20 of them in the wrong fault
-block double its error.
+Measured: 5 to 20 crumbs in the wrong fault block double its error.
 """
 
 SMALL = 200

@@ -29,7 +29,8 @@ def _arguments(folder: Path, **changed: Any) -> Namespace:
     known: dict[str, Any] = dict.fromkeys(
         ("samples", "samples_out", "traces_out", "report", "composite", "holes_columns")
     )
-    known |= {"dip_positive_down": None, "strict": False, "drop_invalid": False}
+    known |= dict.fromkeys(("dip_positive_down", "missing", "below_detection", "cap"))
+    known |= {"strict": False, "drop_invalid": False}
     known["holes"] = [str(folder / f"{name}.csv") for name in ("collar", "survey", "assay")]
     return Namespace(**known | changed)
 

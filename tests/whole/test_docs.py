@@ -14,6 +14,7 @@ import pytest
 import geounfold as gu
 from geounfold.cli import main
 from geounfold.cli.arguments.parser import build_parser
+from geounfold.io import write_surface
 from geounfold.io.formats import FORMATS, find_format
 from geounfold.io.paths import TABLE_ENDINGS
 from geounfold.synthetic import GradeField, drill
@@ -160,6 +161,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wireframe = pd.DataFrame(body.folded[::7], columns=["x", "y", "z"])
     wireframe.to_csv(folder / "wireframe.csv", index=False)
     u.hull_mesh.to_pyvista().save(folder / "wireframe.ply")
+    surfaces = {"solid.dxf": u.hull_mesh, "roof.ts": u.top.folded, "floor.ts": u.bottom.folded}
+    for name, mesh in surfaces.items():
+        write_surface(folder / name, mesh)
     grid = gu.regular_grid(u.points, (10.0, 10.0, 5.0))
     estimated = pd.DataFrame(grid.centroids, columns=["x", "y", "z"])
     estimated[["dx", "dy", "dz"]] = grid.sizes

@@ -47,12 +47,6 @@ PAD_CAPPED = 1.0
 SHELL = 3.0
 """Distance, in blocks, to which the shell reaches past the control mesh."""
 
-SHRINKS = 6
-"""Largest number of steps of the repair.
-
-Of 140 random and field bodies two needed it, one and two steps; 40 made refusals take 70 s.
-"""
-
 _WIDEST = 3.0  # blocks: largest side of the cells on footprints of more than _MANY cells
 _MANY = 8000
 _TURN = 0.1  # radians by which the surface may turn across one of these wider cells
@@ -435,7 +429,7 @@ def build_control(
     if not (_room(columns, _FOCAL) < reach).any():
         rungs.insert(0, ("constant", constant))
     with within(0.5, 1.0):
-        climbed = climb(rungs, blocks, SHRINKS)
+        climbed = climb(rungs, blocks)
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}

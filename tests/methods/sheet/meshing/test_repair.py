@@ -151,7 +151,7 @@ def test_the_ladder_records_what_every_rung_gave(plunging):
 
     # 40 blocks are past the focal distance of the hinges (12 blocks): turned inside out.  Where
     # that is so, offsets fall back to the horizons, 5 blocks away.
-    climbed = climb([("far", lambda: rung(40.0)), ("near", lambda: rung(5.6))], points, 3)
+    climbed = climb([("far", lambda: rung(40.0)), ("near", lambda: rung(5.6))], points)
     assert climbed.proved
     first, second = climbed.rungs
     assert (first.name, second.name) == ("far", "blended")
@@ -166,7 +166,7 @@ def test_what_cannot_be_proved_is_given_back_unproved(plunging):
     # Every other normal looks down: whatever the offsets, prisms are twisted.
     twisted = replace(columns, normal=columns.normal * (-1.0) ** np.arange(len(columns.P))[:, None])
     layers = twisted.layers(np.full((2, columns.count), 5.0), FRACTIONS)
-    climbed = climb([("twisted", lambda: (twisted, layers))], points, 1)
+    climbed = climb([("twisted", lambda: (twisted, layers))], points)
     assert not climbed.proved
     assert [rung.name for rung in climbed.rungs] == ["twisted", "blended", "untangled", "shrunk"]
     assert all(rung.flaws > 0 for rung in climbed.rungs)

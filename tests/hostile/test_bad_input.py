@@ -277,8 +277,9 @@ def test_read_only_folder(tmp_path: Path, points: Path, fails: Callable[..., str
     ("argv", "words"),
     [
         (["--"], ("COMMAND", "geounfold --help")),
-        (["fold"], ("'fold'", "'unfold'", "'compare'")),
-        (["unfold"], ("POINTS", "-o/--output")),
+        (["fold"], ("'fold'", "'unfold'", "geounfold --help")),
+        (["unfold"], ("-o/--output",)),
+        (["unfold", "-o", "o.csv"], ("POINTS",)),
         (["unfold", "p.csv", "-o"], ("-o/--output", "expected one argument")),
         (["unfold", "p.csv", "-o", "out.csv", "--frobnicate"], ("--frobnicate",)),
         (["unfold", "p.csv", "-o", "out.csv", "--summ", "s.json"], ("--summ",)),

@@ -131,7 +131,7 @@ def text_layout(path: Path, head: bytes, columns: Triple | None = None) -> TextL
     separators: tuple[str, ...] = _SEPARATORS
     if given is not None and len(rows) > 1:
         separators, rows = (given.group(1),), rows[1:]
-    names = _names(rows, separators, columns) or _joined_names(rows, head)
+    names = _names(rows, separators, columns, head) or _joined_names(rows, head)
     if len(names.fields) > _MOST_COLUMNS:
         raise InputError(
             f"{path}: is not a table of points: its first row names {len(names.fields)} columns"
@@ -177,7 +177,9 @@ def _layout(path: Path, rows: list[_Line], names: _Names, columns: Triple | None
     )
 
 
-def _names(rows: list[_Line], separators: tuple[str, ...], columns: Triple | None) -> _Names | None:
+def _names(
+    rows: list[_Line], separators: tuple[str, ...], columns: Triple | None, head: bytes
+) -> _Names | None:
     """Return the row of names; None if no row of the first lines can be it."""
     plain = [k for k, line in enumerate(rows) if not line.comment]
     found: _Names | None = None
@@ -186,6 +188,8 @@ def _names(rows: list[_Line], separators: tuple[str, ...], columns: Triple | Non
             fields = split(rows[k].text, separator)
             if len(fields) < 3 or not _has_coordinates(fields, columns):
                 continue
+            if rows[k].text.count('"') % 2:  # quotes protect the end of this line
+                return _joined_names(rows[k:], head, k)
             names = _Names(k, rows[k], separator, fields, True)
             if _as_long(rows, k, separator, len(fields)):
                 return names
@@ -225,8 +229,11 @@ def _first_texts(rows: list[_Line], plain: list[int], separators: tuple[str, ...
     return _Names(some[0], rows[some[0]], BLANKS, fields, False) if bare else None
 
 
-def _joined_names(rows: list[_Line], head: bytes) -> _Names:
-    """Return the first row that is no comment, even if quotes in it protect line ends."""
+def _joined_names(rows: list[_Line], head: bytes, above: int = 0) -> _Names:
+    """Return the first row that is no comment, even if quotes in it protect line ends.
+
+    ``above`` is the number of rows before these.
+    """
     k = next((k for k, line in enumerate(rows) if not line.comment), 0)
     bare = "".join(rows[k].text.split('"')[::2])  # the text outside quotes
     separator = max(",;\t", key=bare.count)
@@ -243,7 +250,7 @@ def _joined_names(rows: list[_Line], head: bytes) -> _Names:
     whole = used < len(following) or rows[k].text.count('"') % 2 == 0
     last = following[used - 1] if whole else rows[k]
     fields = fields if whole else split(rows[k].text, separator)
-    return _Names(k, last, separator, fields, _has_coordinates(fields, None))
+    return _Names(above + k, last, separator, fields, _has_coordinates(fields, None))
 
 
 def split(text: str, separator: str) -> list[str]:

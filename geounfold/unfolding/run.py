@@ -14,7 +14,7 @@ import pandas as pd
 
 from geounfold.backends.blas import one_thread
 from geounfold.body.fill import FilledSolid
-from geounfold.body.fill.shell_of_bodies import with_shells
+from geounfold.body.fill.shell_of_bodies import horizons_of_blocks, with_shells
 from geounfold.body.parts.division import Division
 from geounfold.body.prepare import PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
@@ -157,14 +157,17 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
         prepared, bodies = prepare(place, chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
-    reference = _reference(top, bottom, prepared.frame)
+    reference, told = _reference(top, bottom, prepared.frame), ""
     if solid is not None and reference is None:
         bodies = with_shells(bodies, prepared, solid.shell)
+        told = horizons_of_blocks(bodies, prepared, solid.shell)
     fits = []
     for part, body in enumerate(bodies):
         clock.body(part, len(bodies))
         with _named(prepared.division, part):
             fits.append(fit(body, prepared.frame, chosen, reference, clock.stage))
+    if told:
+        fits[0] = replace(fits[0], warnings=(*fits[0].warnings, told))
     del bodies  # as large as the points, and not needed any more
     with clock.stage("map"):
         mapping = _one_map(fits, prepared, chosen)

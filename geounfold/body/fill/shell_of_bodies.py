@@ -25,3 +25,18 @@ def with_shells(
             found = found.with_vertices(prepared.frame.to_work(found.V))
         out.append(replace(body, shell=found))
     return out
+
+
+def horizons_of_blocks(
+    bodies: Sequence[BodyPoints], prepared: PreparedPoints, shell: Shell | None
+) -> str:
+    """Return why bodies do not get the solid's surface; empty if they do, or lose nothing by it.
+
+    Nothing is lost if the surface is that of its blocks.
+    """
+    if shell is None or shell.blocks is not None or all(b.shell is not None for b in bodies):
+        return ""
+    reason = "has an edge of four triangles, or its blocks lie in several parts"
+    if prepared.division is not None:
+        reason = f"goes around {prepared.division.count} sheet parts"
+    return f"the horizons are those of the blocks, not of the solid's surface, which {reason}"

@@ -38,9 +38,11 @@ def unrounded(points: Floats) -> Floats:
 
     Examples
     --------
-    >>> k = np.stack(np.meshgrid(*[np.arange(6)] * 3, indexing="ij"), -1).reshape(-1, 3) * 2.5
-    >>> np.unique(unrounded(np.rint(k + 6815001.25))[:, 0] - 6815001).round(9).tolist()
-    [0.25, 2.75, 5.25, 7.75, 10.25, 12.75]
+    >>> k = np.stack(np.meshgrid(*[np.arange(24)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    >>> exact = 6815001.25 + 2.5 * k
+    >>> found = unrounded(np.rint(exact))
+    >>> np.abs(np.rint(exact) - exact).max().item(), bool(np.abs(found - exact).max() < 0.1)
+    (0.25, True)
     """
     _check_shared(points)
     found = [_on_steps(column) for column in points.T]

@@ -100,7 +100,10 @@ def test_a_dict_makes_the_options_of_a_stage() -> None:
     assert made.flattener_options == ArapOptions(tol=1e-3)
     assert made.hull_options == HullOptions(level=0.4)
     for wrong, words in (
-        ({"lvel": 0.4}, "no option hull_options.lvel; valid in hull_options: level, blur, edge,"),
+        (
+            {"lvel": 0.4},
+            "no option hull_options.lvel .did you mean 'level'.*; valid in hull_options: level",
+        ),
         ({"level": 2}, "hull_options.level must be a number between 0 and 1, but is 2"),
         ({"sigma": 1}, "hull_options.sigma is called hull_options.blur since 0.2.0"),
         (3, "hull_options must be HullOptions, but is 3"),
@@ -122,10 +125,13 @@ def test_numpy_values_and_odd_texts_are_written() -> None:
     [
         ("reach = ]", "c: not valid TOML: Invalid value (at line 1, column 9)"),
         (f"reach = {'9' * 5000}", "c: not valid TOML: "),
-        ("reech = 3", "c: there is no option reech; valid: method, flattener, hull, split, up,"),
+        (
+            "reech = 3",
+            "c: there is no option reech (did you mean 'reach'?); valid: method,",
+        ),
         (
             "[thesis_options]\ntrimm = 3",
-            "no option thesis_options.trimm; valid in thesis_options: ",
+            "no option thesis_options.trimm (did you mean 'trim'?); valid in thesis_options: ",
         ),
         ("[sheet]\nx = 1", "c: there is no option sheet; valid: method"),
         ("reach = '3'", "c: reach must be a number of 0 or more, but is '3'"),

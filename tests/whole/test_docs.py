@@ -8,6 +8,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -18,6 +19,7 @@ from geounfold.io import write_surface
 from geounfold.io.formats import FORMATS, find_format
 from geounfold.io.paths import TABLE_ENDINGS
 from geounfold.synthetic import GradeField, drill
+from tests.cli.domains import four_domains
 from tests.places import ROOT
 
 DOCS = ROOT / "docs"
@@ -168,6 +170,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     estimated = pd.DataFrame(grid.centroids, columns=["x", "y", "z"])
     estimated[["dx", "dy", "dz"]] = grid.sizes
     estimated.assign(au=1.0, cu=2.0).to_csv(folder / "grid_estimated.csv", index=False)
+    model = four_domains()
+    model["ROCK"] = np.where(model["DOMAIN"] == "LODE 1", "ORE", "OTHER")
+    model.to_csv(folder / "model.csv", index=False)
     return folder
 
 

@@ -284,7 +284,7 @@ def test_one_line_says_whether_to_trust_it(unfolded: gu.Unfolding) -> None:
     told = "proved one-to-one, 1 warning;"  # the column rock varies, and no rows were chosen
     line = rf"<Unfolding of {n} points by sheet: {told} epsilon 0\.\d{{4}}, 0 outside>"
     assert re.fullmatch(line, repr(unfolded))
-    assert "column rock varies (" in unfolded.summary()["warnings"][0]
+    assert "column rock (ore 1764, waste 180) varies" in unfolded.summary()["warnings"][0]
 
 
 def test_notebooks_show_a_table(unfolded: gu.Unfolding) -> None:

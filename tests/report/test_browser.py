@@ -299,7 +299,7 @@ def test_holes_are_named_and_north_is_shown(page: Any) -> None:
     names = page.locator(".hole:visible")
     assert names.all_inner_texts() == ["DH-1", "DH-1"]
     page.uncheck("#names")
-    page.wait_for_function("!document.querySelector('.hole:not([hidden])')")
+    page.wait_for_selector(".hole:not([hidden])", state="detached")
     assert page.text_content("#folded .north") == "N"
 
 

@@ -101,15 +101,25 @@ def merge_blocks(points: Floats, steps: Floats | None, merge: int) -> MergedBloc
     return MergedBlocks(merge, np.stack(middle, axis=1), share, (inner < 1)[row], (deep < 1)[row])
 
 
-def _largest(points: Floats, steps: Floats | None) -> int:
-    """Return the largest number of blocks to merge along a side; 1 merges none.
+def area_and_thickness(points: Floats, steps: Floats | None) -> tuple[float, float]:
+    """Return the area of a body's surface and its mean thickness, working units.
 
-    Surface and thickness are measured on cells of two blocks a side.
+    They are measured on cells of two blocks a side.
+
+    Parameters
+    ----------
+    points, steps
+        As merge_sizes takes them.
     """
     cells, row = OccupiedCells.numbered(_places(points, steps, 2))
     sides = np.ones(3) if steps is None else steps
     area = 4 * _surface_area(cells, np.bincount(row) / 8, 1 / sides) / _SLANT
-    thickness = 2 * len(points) / area
+    return area, 2 * len(points) / area
+
+
+def _largest(points: Floats, steps: Floats | None) -> int:
+    """Return the largest number of blocks to merge along a side; 1 merges none."""
+    area, thickness = area_and_thickness(points, steps)
     wanted = np.ceil(np.sqrt(area / LEAST_SURFACE))
     return int(max(1, min(wanted, thickness // LEAST_LAYERS)))
 

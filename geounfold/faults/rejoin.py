@@ -30,7 +30,7 @@ from geounfold.faults.joints import Joint, facing, first_poses
 from geounfold.faults.moved import moved_onto_blocks
 from geounfold.faults.outline import Outlines
 from geounfold.faults.poses import PoseRules, view
-from geounfold.faults.result import FaultedBody, FaultFit
+from geounfold.faults.result import FaultFit, FaultResult
 from geounfold.faults.settled import along_sd, settled_by
 from geounfold.faults.slips import slips_of
 from geounfold.geometry.mesh import Bools, Floats, Ints
@@ -178,7 +178,7 @@ class Faulting:
 
     def join(
         self, fits: Sequence[BodyFit], bodies: Sequence[BodyPoints], reach: float
-    ) -> tuple[list[BodyFit], FaultedBody]:
+    ) -> tuple[list[BodyFit], FaultResult]:
         """Return the fits in one flat space, and what was found of the faults.
 
         Parameters
@@ -219,7 +219,7 @@ class Faulting:
             )
             for v in found.views
         ]
-        body = FaultedBody(
+        body = FaultResult(
             cells=self.cells(),
             poses=tuple(poses),
             groups=tuple(groups),

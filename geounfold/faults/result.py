@@ -92,7 +92,7 @@ def _quantiles(values: Floats | None) -> tuple[float | None, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class FaultedBody:
+class FaultResult:
     """A body whose fault blocks were unfolded and joined.
 
     Attributes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from geounfold.faults.result import MOST_OVERLAP, FaultedBody, FaultFit
+from geounfold.faults.result import MOST_OVERLAP, FaultFit, FaultResult
 from geounfold.faults.slips import Slips
 from geounfold.quality.trust import WORDS, Reason, Trust
 
@@ -19,7 +19,7 @@ _SIGN = 1.0  # blocks of throw beyond which its sign counts
 _STEADY = 1.0  # blocks by which throws may scatter about a steady change along strike
 
 
-def with_fault_reasons(trust: Trust | None, found: FaultedBody) -> Trust | None:
+def with_fault_reasons(trust: Trust | None, found: FaultResult) -> Trust | None:
     """Return a run's trust with what its faults show; None if nothing was judged."""
     if trust is None:
         return None

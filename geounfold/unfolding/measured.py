@@ -10,7 +10,7 @@ import numpy as np
 from geounfold.body.fault_cells import FaultCells
 from geounfold.body.prepare import PreparedPoints
 from geounfold.body.working_frame import Frame
-from geounfold.faults.result import FaultedBody
+from geounfold.faults.result import FaultResult
 from geounfold.faults.trust import with_fault_reasons
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.mapping.carried import Carried, Returned, few
@@ -66,7 +66,7 @@ def measure(
     fits: Sequence[BodyFit],
     options: UnfoldOptions,
     stage: Stage,
-    faulted: FaultedBody | None = None,
+    faulted: FaultResult | None = None,
 ) -> Measured:
     """Carry the points by a map, and check and measure the answer.
 

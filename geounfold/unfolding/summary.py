@@ -14,7 +14,7 @@ from geounfold.backends.system.memory import peak_memory_mb
 from geounfold.body.check import count_duplicates
 from geounfold.body.parts import Junction
 from geounfold.body.prepare import PreparedPoints
-from geounfold.faults.result import FaultedBody
+from geounfold.faults.result import FaultResult
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
 from geounfold.geometry.mesh import Floats, Ints
@@ -46,7 +46,7 @@ class RunRecord:
         Where the points went, what is proved of the map, how good it is.
     seconds : dict of float
         Per stage.
-    faulted : FaultedBody or None
+    faulted : FaultResult or None
         What taking the faults out gave; None if there are none.
     """
 
@@ -56,7 +56,7 @@ class RunRecord:
     map: UnfoldingMap | PointwiseMap
     measured: Measured
     seconds: dict[str, float]
-    faulted: FaultedBody | None = None
+    faulted: FaultResult | None = None
 
     @property
     def outside(self) -> int:

@@ -46,7 +46,7 @@ from typing import Any
 
 import numpy as np
 from field import processor_seconds
-from pool import Job, finished, load_libraries, place_of, started
+from pool import load_libraries, place_of, tabulated
 from scipy.spatial import cKDTree
 from soak import option, say
 
@@ -301,24 +301,7 @@ def run(args: argparse.Namespace) -> list[Row]:
     task: Callable[[Row], None] = partial(work, options=dict(args.options), cost=args.cost)
     left = chosen(args)
     order = [(row.name, row.way) for row in left]
-    rows: list[Row] = []
-    jobs: list[Job] = []
-    args.table.parent.mkdir(parents=True, exist_ok=True)
-    with args.table.open("w", newline="") as file:
-        writer = csv.DictWriter(file, [f.name for f in fields(Row)])
-        writer.writeheader()
-        try:
-            while left or jobs:
-                while left and len(jobs) < args.jobs:
-                    jobs.append(started(task, left.pop(0), args.memory))
-                for row in finished(jobs, args.seconds, stopped):
-                    rows.append(row)
-                    writer.writerow(asdict(row))
-                    file.flush()
-                    say(line(row))
-        finally:
-            for job in jobs:
-                job.process.kill()
+    rows = tabulated(task, left, args, stopped, lambda row: say(line(row)))
     return sorted(rows, key=lambda row: order.index((row.name, row.way)))
 
 

@@ -39,7 +39,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pool import Job, finished, load_libraries, place_of, started
+from pool import load_libraries, place_of, tabulated
 from soak import option, say
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -210,24 +210,7 @@ def run(args: argparse.Namespace) -> list[Row]:
         and (not args.body or body.name in args.body)
     ]
     order = [row.name for row in chosen]
-    rows: list[Row] = []
-    jobs: list[Job] = []
-    args.table.parent.mkdir(parents=True, exist_ok=True)
-    with args.table.open("w", newline="") as file:
-        writer = csv.DictWriter(file, [f.name for f in fields(Row)])
-        writer.writeheader()
-        try:
-            while chosen or jobs:
-                while chosen and len(jobs) < args.jobs:
-                    jobs.append(started(task, chosen.pop(0), args.memory))
-                for row in finished(jobs, args.seconds, stopped):
-                    rows.append(row)
-                    writer.writerow(asdict(row))
-                    file.flush()
-                    say(line(row))
-        finally:
-            for job in jobs:
-                job.process.kill()
+    rows = tabulated(task, chosen, args, stopped, lambda row: say(line(row)))
     return sorted(rows, key=lambda row: order.index(row.name))
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
+import csv
 import multiprocessing as mp
 import os
 import resource
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
@@ -101,6 +103,54 @@ def finished(
         job.process.join()
         job.pipe.close()
         yield row
+
+
+def tabulated(
+    work: Callable[[Any], None],
+    left: list[Any],
+    args: argparse.Namespace,
+    stop: Callable[[Any, str, str], None],
+    tell: Callable[[Any], None],
+) -> list[Any]:
+    """Unfold all bodies; write a line of the table for each as it ends, and return their rows.
+
+    Parameters
+    ----------
+    work, stop : callable
+        As for `started` and `finished`.
+    left : list of Row
+        One per body, of one dataclass. It is used up.
+    args : Namespace
+        ``table``, ``jobs``, ``memory`` and ``seconds`` of the command line.
+    tell : callable
+        ``tell(row)`` prints a row that ended.
+
+    Raises
+    ------
+    SystemExit
+        There is no body.
+    """
+    if not left:
+        raise SystemExit("no body of the suite has these names")
+    rows: list[Any] = []
+    jobs: list[Job] = []
+    args.table.parent.mkdir(parents=True, exist_ok=True)
+    with args.table.open("w", newline="") as file:
+        writer = csv.DictWriter(file, [f.name for f in fields(left[0])])
+        writer.writeheader()
+        try:
+            while left or jobs:
+                while left and len(jobs) < args.jobs:
+                    jobs.append(started(work, left.pop(0), args.memory))
+                for row in finished(jobs, args.seconds, stop):
+                    rows.append(row)
+                    writer.writerow(asdict(row))
+                    file.flush()
+                    tell(row)
+        finally:
+            for job in jobs:
+                job.process.kill()
+    return rows
 
 
 def place_of(error: Exception) -> str:

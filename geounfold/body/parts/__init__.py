@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from geounfold.body.block_cells import OccupiedCells
+from geounfold.body.merged_blocks import area_and_thickness
 from geounfold.body.parts.junctions import find_junctions
 from geounfold.body.parts.labels import in_pieces, label_cells
 from geounfold.body.parts.rays import medial_points
@@ -29,9 +30,6 @@ The rules' thresholds were set on sheets of 4 to 12 cells. Merged cells find as 
 single ones in six bodies of the field suite whose cells were divided in 8 and in 64. A sheet of
 two cells can be found, so one a quarter as thick as the body's mean is not missed.
 """
-
-_SLANT = 1.5
-"""Mean over all directions of |nx| + |ny| + |nz|: faces of cells per unit of a smooth surface."""
 
 __all__ = ["Junction", "SheetParts", "sheet_parts"]
 
@@ -73,24 +71,15 @@ def sheet_parts(cells: Ints, steps: Floats) -> SheetParts:
 
 
 def _merge(cells: Ints, steps: Floats) -> int:
-    """Return how many cells along each axis may be one, so that the body is _LAYERS of them thick.
-
-    The mean thickness is the volume over half the surface; faces of cells have 1.5 times the area
-    of a smooth surface in the mean over all directions.
-    """
-    occupied = OccupiedCells.of(cells)
-    open_faces = [
-        2 * (len(occupied.keys) - int(occupied.occupied(occupied.keys + int(step)).sum()))
-        for step in occupied.stride
-    ]
-    surface = float(np.array(open_faces) @ (1 / steps)) / _SLANT
-    return max(1, int(2 * len(occupied.keys) / surface / float(steps.max()) / _LAYERS))
+    """Return how many cells a side may be one, so that the body is _LAYERS of them thick."""
+    _, thickness = area_and_thickness(cells * steps, steps)
+    return max(1, int(thickness / float(steps.max()) / _LAYERS))
 
 
 def _merged(cells: Ints, merge: int) -> Ints:
     """Return the merged cells of which at least half is filled, (k, 3)."""
-    every, count = np.unique((cells - cells.min(axis=0)) // merge, axis=0, return_counts=True)
-    return every[2 * count >= merge**3]
+    coarse, row = OccupiedCells.numbered((cells - cells.min(axis=0)) // merge)
+    return coarse.cells_of(coarse.keys[2 * np.bincount(row) >= merge**3])
 
 
 def _one(count: int, thickness: float) -> SheetParts:

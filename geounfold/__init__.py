@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from geounfold.mapping.control_mesh import ControlMesh
     from geounfold.mapping.domain_map import DomainMap, load_domains
     from geounfold.mapping.mesh_map import UnfoldingMap, load
+    from geounfold.modelling import HolesBody, body_from_holes
     from geounfold.quality.neighbour_distances import epsilon, neighbours, nmd
     from geounfold.quality.truth import aligned_rms
     from geounfold.report.of_unfolding import report
@@ -59,6 +60,8 @@ _HOMES = {
     "ModelFrame": "body.model_frame",
     "axes_from_angles": "body.model_frame",
     "block_model": "io.block_sizes",
+    "body_from_holes": "modelling",
+    "HolesBody": "modelling",
     "regular_grid": "body.block_model",
     "transfer": "estimation.transfer",
     "compare": "comparison.flatteners",
@@ -116,6 +119,7 @@ __all__ = [
     "FilledSolid",
     "Flattening",
     "GeounfoldError",
+    "HolesBody",
     "InputError",
     "ModelFrame",
     "Neighbourhood",
@@ -132,6 +136,7 @@ __all__ = [
     "aligned_rms",
     "axes_from_angles",
     "block_model",
+    "body_from_holes",
     "compare",
     "crosscheck",
     "decluster",

@@ -130,7 +130,7 @@ def _run(words: Sequence[str], console: Console) -> None:
 def _command(name: str) -> Callable[[Namespace, Console], None]:
     """Return a command's function; no other command is loaded."""
     run: Callable[[Namespace, Console], None]
-    run = import_module(f"geounfold.cli.commands.{name}").run
+    run = import_module(f"geounfold.cli.commands.{name.replace('-', '_')}").run
     return run
 
 

@@ -19,8 +19,10 @@ from geounfold.drillholes.grades import AssayColumns, grade_columns
 from geounfold.drillholes.names import matched_names
 from geounfold.drillholes.tables import HoleTable, check_fields, read_hole_table
 from geounfold.errors import InputError, OptionError
-from geounfold.geometry.mesh import Bools, Floats
+from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.grade_values import GradeRules, grade_rules
+from geounfold.io.messages import listing, shown
+from geounfold.io.selection.labels import codes_of
 
 SURVEYED, EXTRAPOLATED = "surveyed", "extrapolated"
 SAMPLE_COLUMNS = ("hole", "from", "to", "x", "y", "z", "position", "coverage")
@@ -111,6 +113,7 @@ class DrillHoles:
         *,
         residual: Residual = "merge",
         min_coverage: float = 0.5,
+        by: str | None = None,
     ) -> pd.DataFrame:
         """Return the intervals, or composites of a length, with the coordinates of their midpoints.
 
@@ -123,6 +126,9 @@ class DrillHoles:
             Treatment of a short last composite, as in `CompositeOptions`.
         min_coverage : float, optional
             Smallest assayed share of a composite with a grade, as in `CompositeOptions`.
+        by : str, optional
+            Column of codes, such as the rock. Composites begin anew where the code changes, so that
+            none crosses a contact, and each has its code.
 
         Returns
         -------
@@ -136,7 +142,7 @@ class DrillHoles:
         Raises
         ------
         OptionError
-            A length or rule is outside its valid values.
+            A length or rule is outside its valid values, or there is no column `by`.
         InputError
             No composite is assayed over enough of its length.
         """
@@ -147,11 +153,14 @@ class DrillHoles:
             own: dict[str, Any] = {**self.grades, **self.words}
         else:
             options = CompositeOptions(length=length, residual=residual, min_coverage=min_coverage)
+            run, owner, above = self._runs(by)
             made = composite(
-                iv.hole, iv.start, iv.end, _stacked(self.grades, len(iv.hole), np.float64),
+                run, iv.start - above[run], iv.end - above[run],
+                _stacked(self.grades, len(iv.hole), np.float64),
                 _stacked(self.words, len(iv.hole), object), options,
             )  # fmt: skip
-            hole, start, end = made.hole, made.start, made.end
+            hole, start, end = owner[made.hole], made.start, made.end
+            start, end = start + above[made.hole], end + above[made.hole]
             if not len(hole):
                 raise InputError(
                     f"{self.sources['assay']}: no composite of {length:g} is assayed over "
@@ -174,6 +183,25 @@ class DrillHoles:
         for name in (*self.grades, *self.words):
             columns[f"assay_{name}" if name.lower() in SAMPLE_COLUMNS else name] = own[name]
         return pd.DataFrame(columns)
+
+    def _runs(self, by: str | None) -> tuple[Ints, Ints, Floats]:
+        """Return the run of each interval, and the hole and first depth of each run.
+
+        Without a column, every hole is a run from its collar; else intervals of one code are.
+        """
+        iv = self.intervals
+        if by is None:
+            return iv.hole, np.arange(len(self)), np.zeros(len(self))
+        columns = {**self.words, **self.grades}
+        if by not in columns:
+            raise OptionError(
+                f"{self.sources['assay']}: no column '{shown(by)}' of codes; columns: "
+                f"{listing(columns)}"
+            )
+        codes = codes_of([pd.Series(columns[by])])[0]
+        new = np.r_[True, (iv.hole[1:] != iv.hole[:-1]) | (codes[1:] != codes[:-1])]
+        first = np.flatnonzero(new)
+        return np.cumsum(new) - 1, iv.hole[first], iv.start[first]
 
     def traces(self, step: float | None = None) -> pd.DataFrame:
         """Return points along every hole, from the collar to its end.

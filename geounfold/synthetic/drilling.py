@@ -33,7 +33,8 @@ class DrilledTables:
     survey : DataFrame
         Columns hole, at, azimuth, dip (degrees, positive down).
     assay : DataFrame
-        Columns hole, from, to, grade: the intervals whose midpoints lie in the body.
+        Columns hole, from, to, grade: the intervals whose midpoints lie in the body; with waste
+        those outside too, and a column code.
     """
 
     collar: pd.DataFrame
@@ -45,7 +46,7 @@ class DrilledTables:
         return iter((self.collar, self.survey, self.assay))
 
 
-def drill(
+def drill(  # 9 arguments: a public name; six of them are choices by keyword
     body: Body,
     field: GradeField,
     spacing: float,
@@ -55,6 +56,7 @@ def drill(
     bearing: float = 90.0,
     dip: float = 60.0,
     seed: int = 0,
+    waste: bool = False,
 ) -> DrilledTables:
     """Drill straight holes through a folded body.
 
@@ -78,11 +80,14 @@ def drill(
         Inclination of inclined holes, degrees below the horizontal, 10 to 90.
     seed : int
         Seed of the grid's offset and of the collars' scatter (a tenth of the spacing).
+    waste : bool
+        Whether the tables have the holes that miss the body too, and all intervals near it, with a
+        column code: ORE or WASTE. Waste has no grade.
 
     Returns
     -------
     DrilledTables
-        The holes that hit the body.
+        The holes that hit the body; with `waste` all holes whose collars lie over it.
 
     Raises
     ------
@@ -105,9 +110,12 @@ def drill(
     hole, begin, truth, inside = _intervals(body, start, azimuth, angle, depth, interval)
     if not inside.any():
         raise OptionError("all holes miss the body; take a closer spacing")
-    hole, begin, truth = hole[inside], begin[inside], truth[inside]
+    grade = np.full(len(hole), np.nan)
+    truth = truth[inside]
     low_w, high_w = body.sheet.heights(truth[:, 0], truth[:, 1])
-    grade = field.at(truth, (truth[:, 2] - low_w) / np.maximum(high_w - low_w, 1e-300))
+    grade[inside] = field.at(truth, (truth[:, 2] - low_w) / np.maximum(high_w - low_w, 1e-300))
+    kept = inside | waste
+    hole, begin, grade, inside = hole[kept], begin[kept], grade[kept], inside[kept]
     hit = np.unique(hole)
     names = np.array([f"{pattern[0].upper()}{k:04d}" for k in range(len(start))], dtype=object)
     collar = pd.DataFrame(
@@ -125,6 +133,8 @@ def drill(
     assay = pd.DataFrame(
         {"hole": names[hole], "from": begin, "to": begin + interval, "grade": grade}
     )
+    if waste:
+        assay["code"] = np.where(inside, "ORE", "WASTE")
     return DrilledTables(collar, survey, assay)
 
 

@@ -156,6 +156,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     drilled.collar.to_csv(folder / "collar.csv", index=False)
     drilled.survey.to_csv(folder / "survey.csv", index=False)
     drilled.assay.rename(columns={"grade": "CU"}).to_csv(folder / "assay.csv", index=False)
+    logged = drill(body, field, spacing=50.0, seed=1, waste=True).assay
+    logged = logged[logged["hole"].isin(drilled.collar["hole"])].drop(columns="grade")
+    logged.to_csv(folder / "lith.csv", index=False)
     u = gu.unfold(body.folded)
     u.save(folder / "m.npz")
     samples = gu.read_drillholes(*drilled).samples(2.0).rename(columns={"grade": "CU"})

@@ -139,7 +139,7 @@ def fill_solid(
     shell = closed_shell(mesh)
     cells, told = _own_cells(shell, block_size)
     if cells is None:
-        step, told = _size(block_size, shell.thickness, shell.volume)
+        step, told = block_sides(block_size, shell.thickness, shell.volume)
         cells = Cells(step)
 
     points, sizes = _blocks(cells, shell.mesh.V, _inside(shell.mesh), sub_blocks)
@@ -177,7 +177,7 @@ def fill_between(
     closed = walled(pair)
     V = np.concatenate([pair.top.V, pair.bottom.V])
     F = np.concatenate([pair.top.F, pair.bottom.F + len(pair.top.V)])
-    step, told = _size(block_size, pair.thickness, pair.volume)
+    step, told = block_sides(block_size, pair.thickness, pair.volume)
     cells = Cells(step)
     solid = _within(TriMesh(V, F)) if closed is None else _inside(closed)
     points, sizes = _blocks(cells, V, solid, sub_blocks)
@@ -260,7 +260,7 @@ def _own_cells(
     return Cells(step, lattice.origin, lattice.axes), (told,)
 
 
-def _size(
+def block_sides(
     given: float | Sequence[float] | None, thickness: float, volume: float
 ) -> tuple[Floats, tuple[str, ...]]:
     """Return the sides of a block, (3,), and what the user is told of them."""

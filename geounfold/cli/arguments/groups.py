@@ -132,6 +132,27 @@ def add_holes(section: Section) -> None:
     section.add(
         "--traces-out", metavar="T", help="the holes' paths in both spaces: a table or .vtp"
     )
+    add_hole_rules(section)
+    add_strict(section)
+
+
+def add_hole_tables(section: Section, dest: str, metavar: str, what: str) -> None:
+    """Add the three tables of drill-holes as arguments, and how they are read."""
+    section.add("collar", metavar="COLLAR", help="collars: hole, x, y, z")
+    section.add("survey", metavar="SURVEY", help="surveys: hole, depth, azimuth, dip")
+    section.add(dest, metavar=metavar, help=f"{what}: hole, from, to, ...")
+    add_hole_rules(section)
+    add_strict(section)
+    section.add(
+        "--drop-invalid",
+        action="store_true",
+        rare=True,
+        help="leave out holes that cannot be placed",
+    )
+
+
+def add_hole_rules(section: Section) -> None:
+    """Add the options by which tables of drill-holes are read."""
     section.add(
         "--holes-columns",
         metavar="FIELD=NAME,...",
@@ -146,6 +167,10 @@ def add_holes(section: Section) -> None:
         rare=True,
         help="whether positive dips point down (default: by their sign, if all have the same)",
     )
+
+
+def add_strict(section: Section) -> None:
+    """Add the option that refuses what is otherwise a warning."""
     section.add(
         "--strict",
         action="store_true",

@@ -13,6 +13,7 @@ from geounfold.cli.arguments.estimate import add_estimate
 from geounfold.cli.arguments.groups import add_common
 from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.map import add_map
+from geounfold.cli.arguments.modelling import add_body_from_holes
 from geounfold.cli.arguments.tools import (
     add_completion,
     add_doctor,
@@ -73,7 +74,7 @@ def build_parser(*, holes: bool = False) -> Parser:
     )
     commands = parser.commands()
     for add in (
-        *(add_unfold, partial(add_map, holes=holes), add_estimate),
+        *(add_unfold, partial(add_map, holes=holes), add_estimate, add_body_from_holes),
         *(add_compare, add_crosscheck, add_quality, add_simulate, add_view),
         *(add_fill, add_grid, add_transfer, add_init, add_doctor, add_completion),
     ):

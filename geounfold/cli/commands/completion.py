@@ -15,6 +15,8 @@ _FILES = frozenset(
         *("points", "output", "summary", "map", "mesh", "report", "samples", "samples_out", "top"),
         *("bottom", "holes", "traces_out", "folded", "unfolded", "truth", "config"),
         *("source", "target", "variogram", "differences", "faults_out"),
+        *("collar", "survey", "intervals", "assays", "polygon", "top_out", "bottom_out"),
+        "intercepts_out",
     }
 )
 

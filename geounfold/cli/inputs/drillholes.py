@@ -115,19 +115,12 @@ def read_holes(args: Namespace, console: Console, where: str = "samples_where") 
     if args.holes is None:
         return None
     length = _length(args.composite)
-    columns = _fields(args.holes_columns)
+    settings = hole_settings(args)
     from geounfold.drillholes import read_drillholes
 
     console.stage("reading drill-holes")
-    holes = read_drillholes(
-        *args.holes,
-        columns=columns,
-        dip_positive_down=args.dip_positive_down,
-        strict=args.strict,
-        drop_invalid=args.drop_invalid,
-        where=getattr(args, where, None) if where else None,
-        values=values_rules(args),
-    )
+    chosen = getattr(args, where, None) if where else None
+    holes = read_drillholes(*args.holes, where=chosen, **settings)
     for line in holes.messages():
         console.warn(line)
     drawn = _reported(args)
@@ -136,6 +129,17 @@ def read_holes(args: Namespace, console: Console, where: str = "samples_where") 
         check_writable(args.samples_out, samples)
     traces = holes.traces(length) if args.traces_out is not None or drawn else None
     return HoleData(holes, length, samples, traces)
+
+
+def hole_settings(args: Namespace) -> dict[str, Any]:
+    """Return the arguments of `read_drillholes` that options state, without the choice of rows."""
+    return {
+        "columns": _fields(args.holes_columns),
+        "dip_positive_down": args.dip_positive_down,
+        "strict": args.strict,
+        "drop_invalid": args.drop_invalid,
+        "values": values_rules(args),
+    }
 
 
 def _reported(args: Namespace) -> bool:

@@ -46,7 +46,7 @@ def add_estimate(commands: Any) -> Parser:
     parser = add_command(
         commands,
         "estimate",
-        "estimate a grade on blocks from samples, in the unfolded space",
+        "estimate a grade on blocks, in the unfolded space",
         details=joined(_RESULTS, WHERE, POINT_FORMATS),
         examples=_EXAMPLES,
     )

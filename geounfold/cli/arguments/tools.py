@@ -28,7 +28,7 @@ def add_simulate(commands: Any) -> Parser:
     parser = add_command(
         commands,
         "simulate",
-        "make a simulated folded or faulted body, with its exact truth",
+        "make a simulated folded or faulted body, and its truth",
         details=_SIMULATE,
         examples=(
             "geounfold simulate --list",
@@ -89,7 +89,7 @@ def add_init(commands: Any) -> Parser:
     parser = add_command(
         commands,
         "init",
-        "write all options of the unfolding, with defaults and meanings",
+        "write all options of the unfolding, with meanings",
         examples=(
             "geounfold init -o options.toml",
             "geounfold unfold blocks.csv -o flat.csv --config options.toml",

@@ -156,9 +156,10 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     drilled.collar.to_csv(folder / "collar.csv", index=False)
     drilled.survey.to_csv(folder / "survey.csv", index=False)
     drilled.assay.rename(columns={"grade": "CU"}).to_csv(folder / "assay.csv", index=False)
-    logged = drill(body, field, spacing=50.0, seed=1, waste=True).assay
-    logged = logged[logged["hole"].isin(drilled.collar["hole"])].drop(columns="grade")
-    logged.to_csv(folder / "lith.csv", index=False)
+    (folder / "lode").mkdir()
+    lode = drill(gu.simulate("sim_case_1"), field, spacing=80.0, seed=1, waste=True)
+    for name, table in zip(("collar", "survey", "lith"), lode, strict=True):
+        table.to_csv(folder / "lode" / f"{name}.csv", index=False)
     u = gu.unfold(body.folded)
     u.save(folder / "m.npz")
     samples = gu.read_drillholes(*drilled).samples(2.0).rename(columns={"grade": "CU"})

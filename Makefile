@@ -19,6 +19,7 @@ SCALE_ARGS ?=
 SOAK_ARGS ?=
 FIELD_ARGS ?=
 FAULT_ARGS ?= --page docs/results/faults.md
+UNCERTAINTY_ARGS ?= --page docs/results/uncertainty.md
 RUNS ?= 10
 STUDY_ARGS ?=
 
@@ -81,10 +82,11 @@ bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 	$(BIN)/python tests/benchmarks/scale.py --page --profile $(SCALE_ARGS)
 
-soak: $(STAMP)  ## unfold 1,000 random bodies (30 minutes), the field suite (15), faulted bodies (15)
+soak: $(STAMP)  ## unfold 1,000 random bodies (30 minutes), the field suite (15), faulted ones (15), reliability (15)
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)
 	$(BIN)/python tests/soak/field.py $(FIELD_ARGS)
 	$(BIN)/python tests/soak/faults.py $(FAULT_ARGS)
+	$(BIN)/python tests/soak/uncertainty.py $(UNCERTAINTY_ARGS)
 
 study: $(STAMP)  ## krige in folded, unfolded and true space, 30 minutes; continues a stopped run
 	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)

@@ -19,6 +19,7 @@ from geounfold.mapping.control_mesh import ControlMesh
 from geounfold.methods.sheet.options import SheetOptions
 from geounfold.methods.sheet.result import SheetResult
 from geounfold.quality.trust import Signs
+from geounfold.quality.uncertainty import Spread
 from geounfold.surfaces.hull import Hull
 from geounfold.surfaces.split.result import SurfaceSplit
 
@@ -179,6 +180,8 @@ class BodyFit:
     signs : Signs or None
         What the hull shows of the control mesh; None if there is no control mesh, or if it was not
         measured yet.
+    spread : Spread or None
+        How far other unfoldings of the body spread; None if the user did not choose to measure it.
     """
 
     hull: Hull | None
@@ -193,6 +196,7 @@ class BodyFit:
     points: Floats | None = None
     warnings: tuple[str, ...] = ()
     signs: Signs | None = None
+    spread: Spread | None = None
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,16 @@ MEANINGS = {
         "0 for a block inside; in the input's unit",
         "cividis",
     ),
+    "sd_along": (
+        "error along the layers",
+        "standard deviation of the place along each axis of the layers, in the input's unit",
+        "viridis",
+    ),
+    "sd_across": (
+        "error across the layers",
+        "standard deviation of the height over the layers, in the input's unit",
+        "viridis",
+    ),
     "fault_block": ("fault block", "the block between faults that was unfolded by itself", ""),
     "location": ("location", "inside the map's cells, or extrapolated around them", ""),
     "nmd_folded": (

@@ -18,7 +18,15 @@ from geounfold.unfolding.options import UnfoldOptions
 
 
 def check_method(options: UnfoldOptions) -> None:
-    """Raise OptionError if the method proves nothing, unless that is allowed."""
+    """Raise OptionError if the method proves nothing, unless that is allowed.
+
+    The same if uncertainty is to be measured of another method than ``sheet``.
+    """
+    if options.uncertainty and options.method != "sheet":
+        raise OptionError(
+            f"uncertainty is measured of the method sheet only, not of {options.method}: leave out "
+            "one or the other"
+        )
     if METHODS[options.method].control:
         return
     if options.coordinates != "tet":

@@ -48,6 +48,7 @@ def fit_untold(
     Parameters as `fit_blocks` takes them.
     """
     out: list[BodyFit | None] = []
+    options = replace(options, uncertainty=0)
     for body in bodies:
         try:
             out.append(fit(body, frame, options, None, stage))

@@ -21,6 +21,7 @@ from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Bools, Floats, TriMesh
 from geounfold.methods import METHODS, BodyFit, PreparedBody, SurfacePair
 from geounfold.methods.contract import Stage, mean_top_normal
+from geounfold.methods.sheet.members.run import run_members
 from geounfold.methods.turned_over import OTHER_SIDE, turned_over
 from geounfold.surfaces.given import solid_hull, split_reference
 from geounfold.surfaces.hull import extract_hull
@@ -160,6 +161,11 @@ def _fit_at(
         walls=body.walls if reference is None else None,
     )
     result = method.fit(prepared)
+    if options.uncertainty and result.sheet is not None:
+        with stage("uncertainty"):
+            result = replace(
+                result, spread=run_members(prepared, result.sheet, options.uncertainty)
+            )
     return turned_over(result) if over else result
 
 

@@ -21,6 +21,7 @@ from geounfold.mapping.control_mesh import DATUMS
 from geounfold.mapping.mesh_map import REACH
 from geounfold.mapping.prism_coordinates import COORDINATES
 from geounfold.methods import METHODS, IsomapMethodOptions, VerticalOptions, VolumetricOptions
+from geounfold.methods.sheet.members.run import LEAST_MEMBERS
 from geounfold.methods.sheet.options import SheetOptions
 from geounfold.methods.thesis import ThesisOptions
 from geounfold.quality.neighbour_distances import NEIGHBOURS
@@ -62,10 +63,9 @@ class UnfoldOptions:
     method : str
         How the map is made.  ``sheet``: prisms along the mid surface's normals, with slip between
         layers.  ``thesis``: vertical pairs, flat at mean heights.  ``ufo``: blocks anchored to the
-        flat mid surface along its normals.  ``volumetric``: tetrahedra of least strain.  These
-        four have a control mesh and can be proved one-to-one; the others cannot:
-        ``stratigraphic`` (height as a share of the thickness), ``shear`` (vertical simple shear),
-        ``isomap`` (distances to neighbours).
+        flat mid surface.  ``volumetric``: tetrahedra of least strain.  These can be proved
+        one-to-one.  The others cannot: ``stratigraphic`` (share of the thickness), ``shear``
+        (vertical), ``isomap`` (distances to neighbours).
     flattener : str
         What lays the reference surfaces flat.
     hull : str
@@ -90,6 +90,8 @@ class UnfoldOptions:
         Whether an answer that is not proved one-to-one is given, marked, and is no error.
     strict : bool
         Whether poor trust is an error.
+    uncertainty : int
+        Other unfoldings by which the error of every place is estimated: 0 (none), or 6 or more.
     flattener_options : dataclass, dict or None
         Options of the flattener, such as SpringOptions; None for its defaults.
     hull_options : HullOptions or dict
@@ -131,6 +133,7 @@ class UnfoldOptions:
     reach: float = REACH
     allow_uncertified: bool = False
     strict: bool = False
+    uncertainty: int = 0
     flattener_options: Any = None
     hull_options: HullOptions = field(default_factory=HullOptions)
     sheet_options: SheetOptions = field(default_factory=SheetOptions)
@@ -152,6 +155,12 @@ class UnfoldOptions:
         check_number("reach", self.reach, 0)
         check_flag("allow_uncertified", self.allow_uncertified)
         check_flag("strict", self.strict)
+        check_whole("uncertainty", self.uncertainty, 0)
+        if 0 < self.uncertainty < LEAST_MEMBERS:
+            raise OptionError(
+                f"uncertainty must be 0 or from {LEAST_MEMBERS} up, one unfolding for each "
+                f"question that coordinates leave open, but is {self.uncertainty}"
+            )
         for name, kind in (
             STAGES | {"flattener_options": FLATTENERS[self.flattener].options}
         ).items():

@@ -60,6 +60,9 @@ class Unfolding:
         What is proved of the map, and what stands against it; also a mapping.
     trust : Trust or None
         How far to trust the layers: good, fair or poor, with reasons; None without a control mesh.
+    uncertainty : PositionUncertainty or None
+        Standard deviations of the places, and of those of other points; None if the user did not
+        choose to measure them.
     seconds : dict of float
         Per stage.
     chosen : (m,) bool or None
@@ -87,6 +90,7 @@ class Unfolding:
         self.quality = measured.quality
         self.certificate = measured.certificate
         self.trust = measured.trust
+        self.uncertainty = record.uncertainty
         self.seconds = record.seconds
 
     @property
@@ -169,8 +173,17 @@ class Unfolding:
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear."""
-        return self.quality.blocks.columns()
+        """Distortion per point: volume_ratio, nmd_error, stretch_min, stretch_max, shear.
+
+        With the option uncertainty, sd_along and sd_across too.
+        """
+        return self.quality.blocks.columns() | self._deviations
+
+    @cached_property
+    def _deviations(self) -> dict[str, Floats]:
+        if self.uncertainty is None:
+            return {}
+        return self.uncertainty.columns(self.folded, self.carried.placed)
 
     @property
     def table(self) -> pd.DataFrame:

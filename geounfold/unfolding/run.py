@@ -41,6 +41,7 @@ from geounfold.unfolding.measured import measure
 from geounfold.unfolding.options import UnfoldOptions, check_names
 from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.summary import RunRecord, warnings_of
+from geounfold.unfolding.uncertain import uncertainty_of
 
 _log = logging.getLogger("geounfold")
 
@@ -172,7 +173,8 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     with clock.stage("map"):
         mapping = _one_map(fits, prepared, chosen)
     measured = measure(mapping, prepared, fits, chosen, clock.stage)
-    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds)
+    off = uncertainty_of(fits, prepared.frame, chosen)
+    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, uncertainty=off)
     return _finished(record, given, rows, clock)
 
 
@@ -210,7 +212,8 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
             body=_body_cells(prepared),
         )
     measured = measure(mapping, prepared, fits, options, clock.stage, found)
-    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found)
+    off = uncertainty_of(fits, prepared.frame, options)
+    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off)
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from geounfold.io.messages import counted
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.prism_coordinates import PrismInterpolant
 from geounfold.methods import BodyFit, PointwiseMap, SurfacePair
+from geounfold.quality.uncertainty import PositionUncertainty
 from geounfold.unfolding.level_horizons import flat_size, level_errors
 from geounfold.unfolding.measured import Measured
 from geounfold.unfolding.options import UnfoldOptions
@@ -48,6 +49,8 @@ class RunRecord:
         Per stage.
     faulted : FaultResult or None
         What taking the faults out gave; None if there are none.
+    uncertainty : PositionUncertainty or None
+        How far off the places may be; None if the user did not choose to measure it.
     """
 
     options: UnfoldOptions
@@ -57,6 +60,7 @@ class RunRecord:
     measured: Measured
     seconds: dict[str, float]
     faulted: FaultResult | None = None
+    uncertainty: PositionUncertainty | None = None
 
     @property
     def outside(self) -> int:
@@ -135,6 +139,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "round_trip_max": run.round_trip_max,
         "torn": len(run.measured.torn),
         "trust": None if run.measured.trust is None else run.measured.trust.as_dict(),
+        **({} if run.uncertainty is None else {"uncertainty": run.uncertainty.summary()}),
         **run.measured.quality.summary(),
         "warnings": warnings_of(run),
     }

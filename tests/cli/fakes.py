@@ -32,6 +32,7 @@ class FakeMap:
             points=image,
             stratigraphic=points[:, 2] / 10,
             location=location,
+            placed=np.ones(len(points), dtype=bool),
             distance=np.maximum(-points[:, 0], 0),
             unsolved=0,
         )
@@ -59,6 +60,7 @@ class FakeUnfolding(FakeMap):
         self.warnings, self.junctions = warnings, ()
 
     surfaces: dict[str, Any] = {}  # noqa: RUF012 - a fake has none
+    uncertainty: Any = None
 
     def summary(self) -> dict[str, Any]:
         return {"points": len(self.points), "nmd": np.nan, "warnings": list(self.warnings)}

@@ -13,11 +13,25 @@ if TYPE_CHECKING:
     from geounfold.geometry.mesh import Floats
     from geounfold.mapping.mesh_map import UnfoldingMap
     from geounfold.methods import PointwiseMap
+    from geounfold.quality.uncertainty import PositionUncertainty
 
 
-def flat_columns(saved: UnfoldingMap | PointwiseMap) -> Callable[[Floats], dict[str, Any]]:
-    """Return the function from folded points, (n, 3), to the output columns of the unfolded."""
-    return lambda points: result_columns(UNFOLDED, saved.carry(points))
+def flat_columns(
+    saved: UnfoldingMap | PointwiseMap, uncertainty: PositionUncertainty | None = None
+) -> Callable[[Floats], dict[str, Any]]:
+    """Return the function from folded points, (n, 3), to the output columns of the unfolded.
+
+    With ``uncertainty`` these include the standard deviations of their places.
+    """
+
+    def columns(points: Floats) -> dict[str, Any]:
+        carried = saved.carry(points)
+        found = result_columns(UNFOLDED, carried)
+        if uncertainty is not None:
+            found |= uncertainty.columns(points, carried.placed)
+        return found
+
+    return columns
 
 
 def place_counts(columns: dict[str, Any]) -> dict[str, int]:

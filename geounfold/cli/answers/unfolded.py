@@ -60,7 +60,7 @@ class UnfoldedBody:
         columns = {"mended": mended, "body_part": part or bool(result.junctions)}
         self._asked = [name for name, wanted in columns.items() if wanted]
         self._result, self._body, self._exploration = result, body, exploration
-        carry = flat_columns(result.map)
+        carry = flat_columns(result.map, result.uncertainty)
         self._samples = None if body.samples is None else carry(body.samples.points)
         self._holes = {} if body.holes is None else body.holes.carried(carry)
         self.warnings: list[str] = [*summary.get("warnings", []), *self._carried_warnings()]

@@ -29,6 +29,9 @@ from geounfold.cli.arguments.texts import (
 _DISTORTION = """\
   volume_ratio, nmd_error, stretch_min, stretch_max, shear
                    distortion of each block
+  sd_along, sd_across
+                   with --uncertainty: standard deviation of the place, in
+                   the flat space: along each axis of the layers, and across
   mended           with --mended-column: cut, dropped or smoothed if the hull
                    leaves the block out; else empty
   body_part        if a body has several sheets, or with --part-column: sheet
@@ -88,12 +91,26 @@ def add_unfold(commands: Any) -> Parser:
     )
     group = parser.section("method")
     add_method(group)
+    _add_checks(parser)
+    return parser
+
+
+def _add_checks(parser: Parser) -> None:
+    """Add the arguments for what is proved and how far off the answer may be."""
     group = parser.section("checks")
     group.add(
         "--allow-uncertified",
         action=argparse.BooleanOptionalAction,
         default=argparse.SUPPRESS,
-        help="write a result that is not proved one-to-one; it is marked",
+        help="write a result that is not proved; it is marked",
+    )
+    group.add(
+        "--uncertainty",
+        nargs="?",
+        metavar="N",
+        const="8",
+        default=argparse.SUPPRESS,
+        help="error of every place, from N other unfoldings (8)",
     )
     group.add(
         "--crosscheck",
@@ -101,7 +118,6 @@ def add_unfold(commands: Any) -> Parser:
         rare=True,
         help="compare the control mesh with other meshes of its border",
     )
-    return parser
 
 
 def _add_faults(group: Section) -> None:

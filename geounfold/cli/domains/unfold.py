@@ -173,7 +173,21 @@ class _Answer:
             samples = carried_columns(
                 maps, self._found.column, body.samples.frame, body.samples.points
             )
-        return samples, carried_holes(maps, self._found.column, body.holes)
+            samples |= self._deviations(body.samples.points, samples)
+        holes = carried_holes(maps, self._found.column, body.holes)
+        for name, columns in holes.items():
+            points = getattr(body.holes, name)[list("xyz")].to_numpy(dtype=np.float64)
+            columns |= self._deviations(points, columns)
+        return samples, holes
+
+    def _deviations(self, points: Floats, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the standard deviations of carried points, if --uncertainty measured them."""
+        from geounfold.quality.uncertainty import joined
+
+        parts = [u.uncertainty for u in self._found.values() if u.uncertainty is not None]
+        if not parts:
+            return {}
+        return joined(parts).columns(points, np.isfinite(columns[UNFOLDED[0]]))
 
     def _carried_warnings(self) -> list[str]:
         body = self._body

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 MODEL_OPTIONS = (
     *("method", "flattener", "hull", "split", "up", "datum", "coordinates", "body"),
-    *("parts", "neighbours", "reach"),
+    *("parts", "neighbours", "reach", "uncertainty"),
 )
 """The options of `UnfoldOptions` that have a flag of the same name and a value."""
 
@@ -130,4 +130,5 @@ _READERS: dict[str, Callable[[str], Any]] = {
     "body": _number,
     "neighbours": _number,
     "reach": _number,
+    "uncertainty": _number,
 }

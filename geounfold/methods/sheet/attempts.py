@@ -223,7 +223,7 @@ def _choosy(case: Case) -> FittedSheet | None:
     """
     if case.sites is None or case.unit > 1:
         return None
-    found = case.tried(replace(_tapering(case), agree=0.95))
+    found = case.tried(settings_of("choosy", case))
     return found if found is not None and found.accepted > EXPLAINED else None
 
 
@@ -234,11 +234,20 @@ def _closer(case: Case) -> FittedSheet | None:
     runs straight past the bend, rejects the hull there, and keeps its distance from it.  So it
     never reaches the body's ends, which in overturned folds are long wedges.
     """
-    return case.tried(
-        FitSettings(
+    return case.tried(settings_of("closer", case))
+
+
+def settings_of(name: str, case: Case) -> FitSettings:
+    """Return the settings of an attempt, or of the last resort ``rough``, by its name."""
+    if name == "smooth":
+        return FitSettings(smooth=case.smoothing)
+    if name == "closer":
+        return FitSettings(
             smooth=1.0, rough=1.0, unseen=1e-4, rounds=8, later=0.7, erosion=0.75, ahead=2.0
         )
-    )
+    if name == "rough":
+        return replace(case.first, rough=_ROUGH)
+    return replace(_tapering(case), agree=0.95) if name == "choosy" else _tapering(case)
 
 
 ATTEMPTS = (
@@ -286,7 +295,7 @@ def _least_contradicted(case: Case, trials: list[Trial]) -> Trial:
     first, last = trials[0], trials[-1]
     resort = first
     if case.sites is not None:
-        rough = case.fit(replace(case.first, rough=_ROUGH))
+        rough = case.fit(settings_of("rough", case))
         resort = Trial("rough", rough, np.nan, sites=first.sites)
     if last.name != "closer" or last.contradiction > CLEARLY * first.contradiction:
         return resort

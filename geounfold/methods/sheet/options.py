@@ -18,8 +18,7 @@ class SheetOptions:
     Parameters
     ----------
     smoothing : float
-        Length, in blocks, below which the mid surface is smoothed; shorter follows tighter hinges
-        and rougher hulls alike.
+        Length, in blocks, below which the mid surface is smoothed; less follows tighter hinges.
     core : float
         Least cosine between opposite faces' normals, one reversed, to be top and bottom.
     mesh_cell : float

@@ -60,14 +60,14 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
     with body.stage("sheet"):
         unit = 1 if body.coarse is None else body.coarse.merge
         with within(0.0, 0.08):
-            medial = medial_sheet(body.split, _parameters, body.sheet_options.core)
-        case = _case(body, medial, unit)
+            medial = medial_sheet(body.split, parameters, body.sheet_options.core)
+        case = case_of(body, medial, unit, None if body.hull is None else _sites(body))
         with within(0.08, 0.5):
             trials = _fitted(case)
         plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell)
 
         def build(trial: Trial, misfit: float) -> tuple[FittedSheet, Horizons, SheetMesh]:
-            fitted = conform(trial.fitted, medial.scaled(unit), _parameters)
+            fitted = conform(trial.fitted, medial.scaled(unit), parameters)
             told(0.1)
             horizons = _horizons(fitted, case.samples, trial, misfit)
             with within(0.2, 0.95):
@@ -103,7 +103,7 @@ def _judged_by(body: PreparedBody, unit: int) -> TriMesh:
     return surface.quartered() if body.hull.method == SOLID else surface
 
 
-def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:
+def case_of(body: PreparedBody, medial: MedialSheet, unit: int, sites: Sites | None) -> Case:
     """Return the data that the mid surface is fitted to and judged by."""
     split, hull, coarse = body.split, body.hull, body.coarse
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
@@ -121,7 +121,7 @@ def _case(body: PreparedBody, medial: MedialSheet, unit: int) -> Case:
         samples=samples,
         cells=body.points if coarse is None else coarse.points,
         points=body.points,
-        sites=None if hull is None else _sites(body),
+        sites=sites,
         unit=unit,
         judged=hull is not None,
         smoothing=body.sheet_options.smoothing,
@@ -171,6 +171,6 @@ def _horizons(fitted: FittedSheet, samples: HullSamples, taken: Trial, misfit: f
     return horizons
 
 
-def _parameters(mesh: TriMesh, start: Floats | None) -> Floats:
+def parameters(mesh: TriMesh, start: Floats | None) -> Floats:
     """Return near-isometric parameters of a surface, (n, 2), from springs stopped early."""
     return flatten_surface(mesh, "spring", start=start, options=_LOOSE_SPRINGS, repair=False).uv

@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 
 from geounfold.cli import main
+from geounfold.quality.uncertainty import PositionUncertainty
 from geounfold.report import CarriedHoles, CarriedPoints
-from tests.cli.fakes import RESULTS, SHIFT, replace_module
+from tests.cli.fakes import RESULTS, SHIFT, FakeUnfolding, replace_module
 
 
 def test_unfold_writes_everything(
@@ -107,6 +108,40 @@ def test_options_reach_the_pipeline(points: Path, calls: list[dict[str, Any]]) -
     assert calls[0]["top"] is None
     assert main(["unfold", "p.csv", "-o", "out2.csv", "--body", "all"]) == 0
     assert calls[1]["options"] == {"body": "all"}
+
+
+def test_uncertainty_is_eight_members_or_as_many_as_are_named(
+    points: Path, calls: list[dict[str, Any]]
+) -> None:
+    argv = ["unfold", "p.csv", "-o", "out.csv", "--uncertainty"]
+    assert main(argv) == 0
+    assert main([*argv, "12", "--overwrite"]) == 0
+    assert [call["options"] for call in calls] == [{"uncertainty": 8}, {"uncertainty": 12}]
+
+
+@pytest.mark.parametrize(
+    ("number", "said"), [("3", "must be 0 or from 6 up"), ("many", "must be a whole number")]
+)
+def test_too_few_members_are_refused(
+    points: Path, capsys: pytest.CaptureFixture[str], number: str, said: str
+) -> None:
+    assert main(["unfold", "p.csv", "-o", "out.csv", "--uncertainty", number]) == 2
+    assert f"--uncertainty {said}" in capsys.readouterr().err
+
+
+def test_samples_get_their_standard_deviations(
+    points: Path, tmp_path: Path, calls: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocks = pd.read_csv(points)[["XC", "YC", "ZC"]].to_numpy()
+    sd = np.array([[1.0, 0.5], [2.0, 0.5], [3.0, 0.5]])
+    found = PositionUncertainty(blocks, sd, 8)
+    monkeypatch.setattr(FakeUnfolding, "uncertainty", found, raising=False)
+    (tmp_path / "q.csv").write_text("x,y,z\n7,8,9\n1.5,2,3\n")
+    argv = ["unfold", "p.csv", "-o", "out.csv", "--samples", "q.csv", "--samples-out", "qo.csv"]
+    assert main(argv) == 0
+    out = pd.read_csv(tmp_path / "qo.csv")
+    np.testing.assert_allclose(out["sd_along"], [3, 1], rtol=1e-6)
+    np.testing.assert_allclose(out["sd_across"], 0.5)
 
 
 def test_surfaces_reach_the_pipeline(

@@ -29,8 +29,8 @@ from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, RIM, SiteRules
 
 _HOPELESS = 0.03  # blocks: mean depth on the wrong side from which merged blocks never recovered
 
-_SMOOTH, _LEAST, _PACE = 2.7, 1.73, 1.15
-"""Smoothing length of the mid surface, in blocks: the first, the least, and the factor.
+_LEAST, _PACE = 1.73, 1.15
+"""Least smoothing length of the mid surface, in blocks, and the factor by which it is reduced.
 
 The length is divided by the factor after every round with too many sites on the wrong side.
 """
@@ -115,7 +115,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
     sheet, half, grid = fitted.sheet, fitted.half, fitted.sheet.grid
     places = Places.of(fitted, sites, rules)
     energy = _Energy(grid.energy(4), grid.energy(3), rules.held)
-    smooth, last = _SMOOTH, None
+    smooth, last = rules.smooth, None
     used = fitted.near
     for k, margin in enumerate(rules.margins):
         depth = DEPTHS[min(k, len(DEPTHS) - 1)]
@@ -133,7 +133,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
             return Separation(None, last.depth)
         places.watch(margin)
         if margin <= _ADAPT and last.wrong > _TOLERATED:
-            smooth = max(smooth / _PACE, _LEAST)
+            smooth = max(smooth / _PACE, min(_LEAST, rules.smooth))
     assert last is not None  # there is at least one margin
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))

@@ -16,7 +16,6 @@ from geounfold.methods.sheet.sharpening.lattice_sites import Sites
 from geounfold.methods.sheet.sharpening.site_rules import (
     BAND,
     COVER,
-    RIM,
     SLACK,
     TAPER,
     SiteRules,
@@ -127,8 +126,8 @@ class Places:
         good = (self.right < clearance(margin)) & (np.abs(beyond) < max(BAND, 4 * margin))
         good &= (thickness > rules.thinnest) & (self.taper < TAPER)
         use = np.flatnonzero(good)
-        wide = RIM * np.hypot(1.0, rules.sheared * self.slope[use])
-        most = float(wide.max(initial=RIM))
+        wide = rules.rim * np.hypot(1.0, rules.sheared * self.slope[use])
+        most = float(wide.max(initial=rules.rim))
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=most)[0]
         out: Ints = use[rim > wide]
         return out

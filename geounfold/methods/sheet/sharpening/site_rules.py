@@ -24,6 +24,9 @@ BAND = 1.2
 TAPER = 0.25
 """Slope of the half thickness above which sites are not used: no rim can be told apart there."""
 
+FIRST_SMOOTH = 2.7
+"""Smoothing length of the mid surface in the first round, in blocks."""
+
 SLACK = 0.5
 """Distance, in blocks, past the used sites up to which others are updated as the sheet moves."""
 
@@ -46,6 +49,10 @@ class SiteRules:
     sheared : float
         Share of the slip added to the distance from the rim, because slip spreads the rim's sites
         along the unfolded layer.
+    smooth : float
+        Smoothing length of the mid surface in the first round.
+    rim : float
+        Distance from a hole up to which a site belongs to the rim, not to a horizon.
     """
 
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
@@ -53,6 +60,8 @@ class SiteRules:
     thinnest: float = 1.0
     held: bool = True
     sheared: float = 0.0
+    smooth: float = FIRST_SMOOTH
+    rim: float = RIM
 
     def for_cells(self, side: float) -> SiteRules:
         """Return the rules for a sheet that was fitted to cells of ``side`` blocks.

@@ -19,7 +19,7 @@ SCALE_ARGS ?=
 SOAK_ARGS ?=
 FIELD_ARGS ?=
 FAULT_ARGS ?= --page docs/results/faults.md
-UNCERTAINTY_ARGS ?= --page docs/results/uncertainty.md
+UNCERTAINTY_ARGS ?=
 RUNS ?= 10
 STUDY_ARGS ?=
 

@@ -152,12 +152,16 @@ class Base:
         samples: HullSamples | None = None,
         points: Floats | None = None,
     ) -> FittedSheet | None:
-        """Return the mid surface fitted again to the hull, and to layers if the answer was."""
+        """Return the mid surface fitted again to the hull; None if that fails.
+
+        If points in layers sharpened the answer, they settle what the hull leaves open: the sheet
+        is sharpened again by the ``points`` given, or stays as it is.
+        """
+        if self.trial.sharpened == "layers":
+            fitted = self.trial.fitted
+            return fitted if points is None else sharpen_layers(fitted, points)
         case = self.case if samples is None else replace(self.case, samples=samples)
-        found = case.tried(settings)
-        if found is None or self.trial.sharpened != "layers":
-            return found
-        return sharpen_layers(found, self.case.points if points is None else points)
+        return case.tried(settings)
 
 
 def in_cell(base: Base, seed: int) -> FittedSheet | None:
@@ -227,8 +231,8 @@ def _kept(points: Floats, seed: int) -> Bools:
 
 
 def hull_level(base: Base, seed: int) -> FittedSheet | None:
-    """Take the blurred hull for the surface, not the sites or layers that sharpened it."""
-    return base.case.smooth
+    """Take the blurred hull for the surface, not the sites that sharpened it."""
+    return base.case.smooth if base.trial.sharpened != "layers" else base.trial.fitted
 
 
 def pin_line(base: Base, flat: Floats) -> Floats:

@@ -22,6 +22,7 @@ from geounfold.methods.contract import Stage
 from geounfold.quality.blocks import Quality, assess, assess_points
 from geounfold.quality.torn_blocks import SUSPECT, torn_blocks
 from geounfold.quality.trust import Signs, Trust, judge, measure_signs
+from geounfold.quality.uncertainty import PositionUncertainty, with_spread_reason
 from geounfold.unfolding.checks import (
     check_certified,
     check_coordinates,
@@ -67,6 +68,7 @@ def measure(
     options: UnfoldOptions,
     stage: Stage,
     faulted: FaultResult | None = None,
+    uncertainty: PositionUncertainty | None = None,
 ) -> Measured:
     """Carry the points by a map, and check and measure the answer.
 
@@ -98,6 +100,7 @@ def measure(
         trust = _trust(mapping, prepared, fits, carried)
         if faulted is not None:
             trust = with_fault_reasons(trust, faulted)
+        trust = with_spread_reason(trust, uncertainty, frame.scale)
     check_trust(trust, options)
     return Measured(carried, returned, certificate, quality, torn, trust)
 

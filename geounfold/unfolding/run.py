@@ -172,8 +172,8 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     del bodies  # as large as the points, and not needed any more
     with clock.stage("map"):
         mapping = _one_map(fits, prepared, chosen)
-    measured = measure(mapping, prepared, fits, chosen, clock.stage)
     off = uncertainty_of(fits, prepared.frame, chosen)
+    measured = measure(mapping, prepared, fits, chosen, clock.stage, uncertainty=off)
     record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, uncertainty=off)
     return _finished(record, given, rows, clock)
 
@@ -211,8 +211,8 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
             parts=parts,
             body=_body_cells(prepared),
         )
-    measured = measure(mapping, prepared, fits, options, clock.stage, found)
     off = uncertainty_of(fits, prepared.frame, options)
+    measured = measure(mapping, prepared, fits, options, clock.stage, found, off)
     return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off)
 
 

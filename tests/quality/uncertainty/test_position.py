@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from geounfold.quality.uncertainty import PositionUncertainty, Spread, calibrated, joined, laid_on
+from geounfold.quality.trust import Reason, Trust
+from geounfold.quality.uncertainty import (
+    PositionUncertainty,
+    Spread,
+    calibrated,
+    joined,
+    laid_on,
+    with_spread_reason,
+)
 from geounfold.quality.uncertainty.calibration import Mix
 from geounfold.quality.uncertainty.position import BAND_ACROSS, BAND_ALONG, within
 from geounfold.quality.uncertainty.spread import FARTHEST
@@ -116,3 +124,20 @@ def test_shares_of_a_mix_add_up() -> None:
     mix = Mix({"a": 4.0}, local=0.25, floor=0.0)
     # A quarter at the block, three quarters of the mean 0.5; times 4.
     assert_allclose(mix.deviation({"a": np.array([0.0, 1.0])}) ** 2, [1.5, 2.5])
+
+
+@pytest.mark.parametrize(
+    ("sd", "before", "after"),
+    [(0.2, "good", "good"), (0.5, "good", "fair"), (1.5, "good", "poor"), (0.5, "poor", "poor")],
+)
+def test_a_wide_spread_lowers_the_trust(sd: float, before: str, after: str) -> None:
+    # Blocks of 10: the expected error is sqrt(3) of these deviations, 0.35, 0.87 and 2.6 blocks.
+    off = PositionUncertainty(W, np.full((len(W), 2), 10 * sd), 8)
+    old = Reason("a step", None, 1, "look", before)
+    trust = Trust(before, () if before == "good" else (old,))
+    found = with_spread_reason(trust, off, 10.0)
+    assert found is not None
+    assert found.word == after
+    assert len(found.reasons) == (before == "poor") + (sd > 0.3)
+    assert with_spread_reason(trust, None, 10.0) is trust
+    assert with_spread_reason(None, off, 10.0) is None

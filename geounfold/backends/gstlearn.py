@@ -23,10 +23,16 @@ from geounfold.geometry.mesh import Floats, Ints
 ISLANDS = 16
 """Targets per call: the cost per target is least at this number, and offsets stay small."""
 
-_KINDS = {"spherical": "SPHERICAL", "exponential": "EXPONENTIAL", "gaussian": "GAUSSIAN"}
+_KINDS = {
+    "spherical": "SPHERICAL",
+    "exponential": "EXPONENTIAL",
+    "gaussian": "GAUSSIAN",
+    "matern": "MATERN",
+}
 
-Part = tuple[str, float, Sequence[float]]
-"""Kind, sill and three ranges of a variogram structure."""
+Part = tuple[str, float, Sequence[float], float]
+"""Kind, sill, three ranges and smoothness of a variogram structure. Only a Matern structure has a
+smoothness s; its three lengths are those of x in x^s K_s(x), not ranges."""
 
 
 def library() -> ModuleType:
@@ -78,8 +84,10 @@ def parts_of(model: Any) -> tuple[float, list[Part], Floats]:
             raise InputError(
                 f"gstlearn's {key} has no counterpart; geounfold has {', '.join(_KINDS.values())}"
             )
-        ranges = tuple(float(r) for r in part.getRanges())
-        parts.append((kind, sill, ranges))
+        smoothness = float(part.getParam())
+        factor = 1 / np.sqrt(12 * smoothness) if kind == "matern" else 1.0
+        ranges = tuple(factor * float(r) for r in part.getRanges())
+        parts.append((kind, sill, ranges, smoothness))
         if len(set(ranges)) > 1:
             turns.append(np.asarray(part.getAnisoRotMat().toTL(), dtype=np.float64).T)
     axes = turns[0] if turns else np.eye(3)
@@ -118,9 +126,9 @@ def krige(
         Number of samples of each target, at least 1: the first ones of its row.
     nugget : float
         Nugget variance.
-    structures : sequence of (kind, sill, ranges)
-        Spherical, exponential or gaussian. The range is the distance at which 5 % of the
-        covariance is left; of the spherical one, at which none is.
+    structures : sequence of Part
+        The range is the distance at which 5 % of the covariance is left; of the spherical one, at
+        which none is.
     mean : float, optional
         Known mean, for simple kriging; ordinary kriging if None.
 
@@ -186,22 +194,35 @@ def _model(
     mean: float | None,
     angles: Sequence[float] = (),
 ) -> Any:
-    parts = [(_KINDS[kind], sill, list(ranges)) for kind, sill, ranges in structures]
+    parts = [_part(*structure) for structure in structures]
     if nugget > 0 or not parts:
-        parts.append(("NUGGET", nugget, [1.0, 1.0, 1.0]))
-    name, sill, ranges = parts[0]
+        parts.append(("NUGGET", nugget, [1.0, 1.0, 1.0], 1.0))
+    name, sill, ranges, param = parts[0]
     kind = getattr(gl.ECov, name)
     model = gl.Model.createFromParam(
-        kind, 1.0, sill, 1.0, ranges, gl.MatrixSymmetric(), list(angles), space, True
+        kind, 1.0, sill, param, ranges, gl.MatrixSymmetric(), list(angles), space, True
     )
-    for name, sill, ranges in parts[1:]:
+    for name, sill, ranges, param in parts[1:]:
         turned = (gl.MatrixSymmetric(), list(angles)) if angles else ()
-        model.addCovFromParam(getattr(gl.ECov, name), 1.0, sill, 1.0, ranges, *turned)
+        model.addCovFromParam(getattr(gl.ECov, name), 1.0, sill, param, ranges, *turned)
     if mean is None:
         model.setDriftIRF(0)
     else:
         model.setMean(mean)
     return model
+
+
+def _part(
+    kind: str, sill: float, ranges: Sequence[float], smoothness: float
+) -> tuple[str, float, list[float], float]:
+    """Return gstlearn's name, sill, ranges and third parameter of a structure.
+
+    gstlearn's range of a Matern structure is sqrt(12 s) of its scale (measured with 1.11.1).
+    """
+    if kind != "matern":
+        return _KINDS[kind], sill, list(ranges), 1.0
+    factor = float(np.sqrt(12 * smoothness))
+    return _KINDS[kind], sill, [factor * r for r in ranges], smoothness
 
 
 def _reach(offsets: Floats, counts: Ints) -> float:

@@ -16,10 +16,16 @@ import numpy as np
 from geounfold.errors import InputError, MissingDependencyError, OptionError
 from geounfold.geometry.mesh import Floats
 
-Part = tuple[str, float, Sequence[float]]
-"""Kind, sill and three ranges of a variogram structure."""
+Part = tuple[str, float, Sequence[float], float]
+"""Kind, sill, three ranges and smoothness of a variogram structure. Only a Matern structure has a
+smoothness s; its three lengths are those of x in x^s K_s(x), not ranges."""
 
-_CLASSES = {"spherical": "Spherical", "exponential": "Exponential", "gaussian": "Gaussian"}
+_CLASSES = {
+    "spherical": "Spherical",
+    "exponential": "Exponential",
+    "gaussian": "Gaussian",
+    "matern": "Matern",
+}
 _LEFT = {
     "spherical": 1.0,
     "exponential": float(np.log(20)),
@@ -66,17 +72,19 @@ def model_of(nugget: float, parts: Sequence[Part], axes: Floats) -> Any:
     gs = library()
     if not parts:
         return gs.Nugget(dim=3, nugget=nugget)
-    shapes = np.array([np.divide(ranges, ranges[0]) for _, _, ranges in parts])
+    shapes = np.array([np.divide(ranges, ranges[0]) for _, _, ranges, _ in parts])
     if not np.allclose(shapes, shapes[0], rtol=1e-9):
         raise OptionError(
             "GSTools sums only structures whose ranges are in proportion, but these are "
-            + " and ".join(str(tuple(ranges)) for _, _, ranges in parts)
+            + " and ".join(str(tuple(ranges)) for _, _, ranges, _ in parts)
         )
     out: Any = None
-    for kind, sill, ranges in parts:
+    for kind, sill, ranges, smoothness in parts:
         named = getattr(gs, _CLASSES[kind])
-        scale = named(dim=3).rescale / _LEFT[kind]
-        one = named(dim=3, var=sill, len_scale=[scale * r for r in ranges], angles=_angles(axes))
+        more = {"nu": smoothness} if kind == "matern" else {}
+        scale = named(dim=3, **more).rescale / _left(kind, smoothness)
+        lengths = [scale * r for r in ranges]
+        one = named(dim=3, var=sill, len_scale=lengths, angles=_angles(axes), **more)
         out = one if out is None else out + one
     out.nugget = nugget  # of a sum too
     return out
@@ -103,11 +111,20 @@ def parts_of(model: Any) -> tuple[float, list[Part], Floats]:
                 f"GSTools' {type(one).__name__} has no counterpart; geounfold has "
                 f"{', '.join(_CLASSES.values())}"
             )
-        scale = _LEFT[kind] / one.rescale
+        smoothness = float(getattr(one, "nu", 1.0))
+        scale = _left(kind, smoothness) / one.rescale
         ranges = tuple(float(scale * r) for r in one.len_scale_vec)
-        parts.append((kind, float(one.var), ranges))
+        parts.append((kind, float(one.var), ranges, smoothness))
         axes = _axes(*(float(a) for a in one.angles))
     return nugget, parts, axes
+
+
+def _left(kind: str, smoothness: float) -> float:
+    """Return the argument of a model's correlation at a structure's range.
+
+    GSTools' Matern model is x^s K_s(x) with x = sqrt(s) h; its lengths here are those of x.
+    """
+    return float(1 / np.sqrt(smoothness)) if kind == "matern" else _LEFT[kind]
 
 
 def _axes(a: float, b: float, c: float) -> Floats:

@@ -264,7 +264,7 @@ class _Job:
             (values - centre) / scale,
             counts,
             model.nugget / sill,
-            [(s.kind, s.sill / sill, s.ranges) for s in model.structures],
+            [(kind, part / sill, *more) for kind, part, *more in model.parts],
             None if self.mean is None else 0.0,
         )
         wrong = ~(variance <= _WORST)

@@ -19,7 +19,7 @@ def body():
 
 
 def test_fields_and_variograms_mean_the_same_by_a_kind() -> None:
-    assert set(FIELD_KINDS) == set(KINDS)
+    assert set(FIELD_KINDS) < set(KINDS)  # matern has no field
 
 
 @pytest.mark.parametrize("kind", FIELD_KINDS)

@@ -9,8 +9,9 @@ unfolded space and calls it. `exploration` computes the tables of exploratory da
 
 from geounfold.estimation.declustering import Declustering, decluster
 from geounfold.estimation.estimate import Estimation, estimate
+from geounfold.estimation.experimental import FEWEST_SAMPLES, directional
 from geounfold.estimation.exploration import Exploration, contact, explore, histogram, swath
-from geounfold.estimation.fit import FEWEST_SAMPLES, FittedVariogram, directional, fit_variogram
+from geounfold.estimation.fit import FittedVariogram, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples
 from geounfold.estimation.kriging import (
     FLAGS,
@@ -22,7 +23,7 @@ from geounfold.estimation.kriging import (
 )
 from geounfold.estimation.neighbourhood import Neighbourhood
 from geounfold.estimation.scores import Scores, conservation, grade_tonnage, score
-from geounfold.estimation.variogram import KINDS, Structure, Variogram, from_json
+from geounfold.estimation.variogram import KINDS, Structure, Variogram, from_json, from_toml
 
 __all__ = [
     "FEWEST_SAMPLES",
@@ -49,6 +50,7 @@ __all__ = [
     "fit_variogram",
     "flat_samples",
     "from_json",
+    "from_toml",
     "grade_tonnage",
     "histogram",
     "hole_numbers",

@@ -20,9 +20,10 @@ from geounfold.estimation.kriging import (
     Estimates,
     Method,
     cross_validate,
+    gathered,
     krige,
 )
-from geounfold.estimation.neighbourhood import Neighbourhood
+from geounfold.estimation.neighbourhood import Neighbourhood, least_factor
 from geounfold.estimation.scores import Conservation, conservation
 from geounfold.estimation.variogram import Triple, Variogram
 from geounfold.geometry.mesh import Floats
@@ -32,7 +33,10 @@ from geounfold.io.selection import read_where
 from geounfold.io.tables.points import chosen_rows
 from geounfold.mapping.carried import Carried, checked_points
 
-_REACH = 2.0  # search radii in variogram ranges, if the user gives none
+_REACH = 2.0
+"""Search radii in variogram ranges, if the user gives none and all blocks find their samples."""
+
+_CLEAR = 1.001  # radii over the distance of the last sample that is needed
 _PLAIN = {"min_samples", "max_samples", "max_per_hole"}
 
 
@@ -63,6 +67,9 @@ class Estimation:
     body_known : bool
         Whether the map holds the body's own blocks. Without them, blocks and samples inside the
         control mesh between bottom and top count as the body's.
+    widened : (float, int) or None
+        Factor by which the search radii exceed twice the variogram's ranges, and the number of
+        blocks that need it; None if no block does, or the user gave the radii.
     """
 
     grade: str
@@ -75,6 +82,7 @@ class Estimation:
     neighbourhood: Neighbourhood
     declustering: Declustering | None = None
     body_known: bool = True
+    widened: tuple[float, int] | None = None
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -118,6 +126,16 @@ class Estimation:
         """Return one line for each group of samples left out or blocks not estimated."""
         counts = self.blocks.counts()
         lines = self.samples.warnings(self.grade)
+        if self.fitted is not None:
+            lines += self.fitted.warnings()
+        if self.widened is not None and self.widened[1]:
+            few, radii = self.neighbourhood.min_samples, self.neighbourhood.radii
+            lines.append(
+                f"{self.widened[1]} of {len(self.blocks.flag)} blocks have fewer than {few} "
+                f"samples within twice the variogram's ranges: the search radii are "
+                f"{', '.join(f'{r:.4g}' for r in radii)} so that none stays empty; --radii sets "
+                "others"
+            )
         more = {OUTSIDE_BODY: "; --all-blocks estimates them too"}
         lines += [
             f"{counts[flag]} of {len(self.blocks.flag)} blocks are not estimated: {flag}"
@@ -143,6 +161,7 @@ class Estimation:
             "support": "points at the blocks' centroids",
             "variogram": None if self.variogram is None else self.variogram.facts(),
             "variogram_fitted": self.fitted is not None,
+            "variogram_fit": None if self.fitted is None else self.fitted.facts(),
             "variogram_misfit": None if self.fitted is None else self.fitted.misfit,
             "neighbourhood": {
                 "radii": list(near.radii),
@@ -150,6 +169,7 @@ class Estimation:
                 "min_samples": near.min_samples,
                 "max_samples": near.max_samples,
                 "max_per_hole": near.max_per_hole,
+                "widened": None if self.widened is None else self.widened[0],
             },
             "samples": self.samples.facts(),
             "blocks": {"given": len(v), **self.blocks.counts()},
@@ -201,7 +221,8 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
         Ordinary kriging, simple kriging or inverse distance.
     neighbourhood : Neighbourhood or mapping, optional
         The search neighbourhood, or a mapping of some of its parameters. Without radii, the
-        radii are twice the variogram's ranges, along its axes.
+        radii are twice the variogram's ranges, along its axes, or as much more as blocks and
+        cross-validation need to find `min_samples`.
     mean : float, optional
         Mean of simple kriging; the default is the mean of the samples.
     power : float
@@ -259,10 +280,10 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
         mean = weighed.mean
     fitted = None
     if variogram is None and (method != "inverse_distance" or _needs_radii(neighbourhood)):
-        fitted = fit_variogram(flat.points, flat.grades)
+        fitted = fit_variogram(flat.points, flat.grades, holes=flat.holes)
         variogram = fitted.model
-    near = _neighbourhood(neighbourhood, variogram, flat.points)
     targets = np.where(own[:, None], carried.points, np.nan)
+    near, widened = _neighbourhood(neighbourhood, variogram, flat, targets)
     found = krige(
         flat.points, flat.grades, targets, variogram, near,
         method=method, holes=flat.holes, mean=mean, power=power, workers=workers,
@@ -272,7 +293,9 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
     if method == "inverse_distance":
         variogram = fitted = None
     known = getattr(carrier, "body", None) is not None
-    return Estimation(grade, found, carried, flat, method, variogram, fitted, near, weighed, known)
+    return Estimation(
+        grade, found, carried, flat, method, variogram, fitted, near, weighed, known, widened
+    )
 
 
 def _rows(given: Any, where: str | None, source: str) -> Any:
@@ -294,28 +317,47 @@ def _needs_radii(given: Neighbourhood | Mapping[str, Any] | None) -> bool:
 
 
 def _neighbourhood(
-    given: Neighbourhood | Mapping[str, Any] | None, variogram: Variogram | None, points: Floats
-) -> Neighbourhood:
-    """Return the neighbourhood given, with radii from the variogram if it has none."""
+    given: Neighbourhood | Mapping[str, Any] | None,
+    variogram: Variogram | None,
+    flat: FlatSamples,
+    targets: Floats,
+) -> tuple[Neighbourhood, tuple[float, int] | None]:
+    """Return the neighbourhood given, with radii from variogram and spacing if it has none.
+
+    With it come the factor and the number of blocks of `Estimation.widened`.
+    """
     if isinstance(given, Neighbourhood):
-        return given
+        return given, None
     words = dict(given or {})
     unknown = set(words) - _PLAIN - {"radii", "rotation"}
     if unknown:
         raise OptionError(f"a neighbourhood has no parameter {sorted(unknown)[0]!r}")
-    if "radii" not in words:
-        extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
-        ranges = (0.0, 0.0, 0.0) if variogram is None else variogram.ranges
-        words["radii"] = _radii(ranges, extent)
-        words["rotation"] = (0.0, 0.0, 0.0) if variogram is None else variogram.rotation
-    return Neighbourhood(**words)
+    if "radii" in words:
+        return Neighbourhood(**words), None
+    words["radii"] = _radii(variogram, flat.points)
+    words["rotation"] = (0.0, 0.0, 0.0) if variogram is None else variogram.rotation
+    near = Neighbourhood(**words)
+    samples = gathered(flat.points, flat.grades, flat.holes)
+    if flat.holes is None and near.max_per_hole is not None:
+        return near, None  # refused by `krige`
+    needed = least_factor(near, samples.points, samples.holes, targets)
+    most = [float(np.nanmax(needed, initial=0.0))]
+    if samples.holes is not None:
+        left_out = least_factor(near, samples.points, samples.holes, samples.points, samples.holes)
+        most.append(float(np.nanmax(left_out, initial=0.0)))
+    if max(most) <= 1:
+        return near, None
+    factor = _CLEAR * max(most)
+    a, b, c = (factor * r for r in near.radii)
+    return replace(near, radii=(a, b, c)), (factor, int(np.count_nonzero(needed > 1)))
 
 
-def _radii(ranges: Triple, extent: float) -> Triple:
+def _radii(variogram: Variogram | None, points: Floats) -> Triple:
     """Return twice the ranges; for a pure nugget, the diagonal of the samples' extent."""
-    if not min(ranges) > 0:
+    if variogram is None or not variogram.structures:
+        extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
         return extent, extent, extent
-    a, b, c = (_REACH * r for r in ranges)
+    a, b, c = (_REACH * r for r in variogram.reach)
     return a, b, c
 
 

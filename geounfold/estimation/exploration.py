@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError, OptionError
-from geounfold.estimation.fit import FittedVariogram, directional, fit_variogram
+from geounfold.estimation.experimental import directional
+from geounfold.estimation.fit import FittedVariogram, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.grade_values import GradeRules, grade_rules
@@ -121,8 +122,8 @@ def explore(
         layers=by_layer(s, v, layers),
         variograms={"folded": directional(flat.folded, v), "unfolded": directional(flat.points, v)},
         models={
-            "folded": fit_variogram(flat.folded, v),
-            "unfolded": fit_variogram(flat.points, v),
+            "folded": fit_variogram(flat.folded, v, holes=flat.holes),
+            "unfolded": fit_variogram(flat.points, v, holes=flat.holes),
         },
         swaths={name: swath(place, v, bins) for name, place in places.items()},
         contacts={"bottom": contact(s, v, 0.05), "top": contact(1 - s, v, 0.05)},

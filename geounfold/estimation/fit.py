@@ -1,51 +1,55 @@
-"""Experimental variograms of samples, and a model fitted to them automatically.
+"""Variogram models fitted to samples automatically.
 
-Pairs of samples are binned by their separation along and across the axes, so that every pair is
-used in whatever direction the holes run. The model is fitted to the bins by weighted least squares.
-A bin's weight is its number of pairs over the square of the model (Cressie 1985, Mathematical
-Geology 17: 563-586) and over the square of the distance in ranges, because the nearest samples
-have most weight in kriging.
+The model is fitted to normal scores of the grades by restricted maximum likelihood on subsets of
+holes, and carried back to the grades (`likelihood`, `normal_scores`). A second structure, or a
+second direction in the layer, must pass two tests. The likelihood grows by more than the parameters
+that it adds would by chance (Schwarz 1978, Annals of Statistics 6: 461-464). And whole-hole
+cross-validation of the grades has a smaller error (`left_out`): real grades are not stationary, so
+their likelihood alone prefers two structures that estimate worse (docs/study-variograms.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares, nnls
 
+from geounfold.backends.blas import one_thread
 from geounfold.errors import InputError, OptionError
-from geounfold.estimation.variogram import KINDS, Structure, Triple, Variogram, correlation, numbers
-from geounfold.geometry.mesh import Floats
+from geounfold.estimation.experimental import (
+    PAIRS,
+    cells_of,
+    checked,
+    down_hole,
+    down_hole_nugget,
+    thinned,
+)
+from geounfold.estimation.least_squares import fitted_cells, three
+from geounfold.estimation.left_out import LeftOut
+from geounfold.estimation.likelihood import AXES, Shape, Subsets, first_shape, packed
+from geounfold.estimation.normal_scores import hermite_shares, normal_scores, shape_of_grades
+from geounfold.estimation.variogram import KINDS, Structure, Triple, Variogram, numbers
+from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.rotations import angles_of
 from geounfold.geometry.rotations import rotation_from_angles as turned
 
-Anisotropy = Literal["isotropic", "transverse", "orthotropic"]
-ANISOTROPIES: tuple[str, ...] = get_args(Anisotropy)
-"""Isotropic: one range; transverse: one in the plane of axes 1 and 2, one along 3; else three."""
+Anisotropy = Literal["auto", "isotropic", "transverse", "orthotropic"]
+Weights = Literal["likelihood", "near", "cressie"]
+WEIGHTS: tuple[str, ...] = get_args(Weights)
+"""Ways of fitting: restricted maximum likelihood, or least squares with two kinds of weights."""
 
-MOST_SAMPLES = 3000
-"""Most samples used: pairs grow with their square. From more, a fixed seed draws so many."""
-
-FEWEST_SAMPLES = 20
-"""Fewest samples of which a variogram is fitted."""
-
-_BINS = {1: 24, 2: 12, 3: 7}  # bins along each axis
-_FINER = 1.5  # exponent of the bins' edges: bins are narrower at short distances
-_PAIRS = 10  # fewest pairs in a bin that is used
-_SHARE = 0.5  # longest lag, as a share of the samples' extent
-_NUGGET = 1e-3  # smallest nugget beside a gaussian structure, as a share of the sill
-_STARTS = (0.15, 0.5)  # starting ranges, as shares of the longest lags
-_NEAR = 0.1  # squared ranges, added to a bin's squared distance to limit the weight of near bins
-_ROUNDS = 3  # fits: one with equal weights, the others with weights of the last model
-_ROWS = 256  # samples whose pairs are held in memory at a time
+_BOUNDS = 0.005, 3.0  # shortest and longest range, as shares of the samples' extent
+_NUGGET = 1e-3  # smallest nugget beside gaussian structures alone, as a share of the sill
+_LEAST_SHARE = 0.05  # smallest share of the sill of a second structure
+_MUCH_NUGGET = 0.7  # share of the sill above which a warning is due
 
 
 @dataclass(frozen=True, eq=False)
 class FittedVariogram:
-    """A fitted model and the bins that it was fitted to.
+    """A fitted model and the bins that it is compared with.
 
     Attributes
     ----------
@@ -59,23 +63,89 @@ class FittedVariogram:
         Root mean square of gamma over the model's gamma, less 1, weighted by pairs.
     anisotropy : str
         isotropic, transverse or orthotropic.
+    weights : str
+        likelihood, near or cressie.
+    value : float
+        Minus the logarithm of the restricted likelihood, but for a constant: of fits to the same
+        samples with other rotations, the smallest is the best. NaN with other weights.
+    down_hole : DataFrame or None
+        The variogram along the holes (`experimental.down_hole`); None if the holes are not known.
+    spacing : float
+        Median distance in the layer between a hole and the nearest other hole; between a sample
+        and the nearest other one if the holes are not known.
+    extent : (float, float, float)
+        Lengths of the samples' extent along the axes.
+    bounds : tuple of str
+        Names of the parameters that ended on a bound of the fit.
     """
 
     model: Variogram
     cells: pd.DataFrame
     misfit: float
     anisotropy: str
+    weights: str = "likelihood"
+    value: float = float("nan")
+    down_hole: pd.DataFrame | None = None
+    spacing: float = float("nan")
+    extent: Triple = (float("inf"), float("inf"), float("inf"))
+    bounds: tuple[str, ...] = ()
+
+    def facts(self) -> dict[str, object]:
+        """Return how the model was fitted, for a summary."""
+        nugget = None if self.down_hole is None else down_hole_nugget(self.down_hole)
+        return {
+            "weights": self.weights,
+            "anisotropy": self.anisotropy,
+            "misfit": self.misfit,
+            "down_hole_nugget": nugget,
+            "hole_spacing": self.spacing if np.isfinite(self.spacing) else None,
+            "bounds_hit": list(self.bounds),
+        }
+
+    def warnings(self) -> list[str]:
+        """Return one line for each sign that the model should be looked at."""
+        model, lines = self.model, []
+        for name in self.bounds:
+            lines.append(
+                f"the fitted variogram's {name} lies on a bound of the fit: the samples do not "
+                "show it; give a model by --variogram"
+            )
+        if not model.structures:
+            return [*lines, "the fitted variogram is a pure nugget: estimates are local means"]
+        if model.nugget > _MUCH_NUGGET * model.sill:
+            lines.append(
+                f"the fitted variogram's nugget is {model.nugget / model.sill:.0%} of its sill: "
+                "estimates will be close to local means; check composites, outliers and domains"
+            )
+        names = ("along axis 1", "along axis 2", "across the layer (axis 3)")
+        for name, length, extent in zip(names, model.ranges, self.extent, strict=True):
+            if length > extent > 0:
+                lines.append(
+                    f"the fitted variogram's range {name}, {length:.4g}, is longer than the "
+                    f"samples' extent, {extent:.4g}: grades may trend, or need domains"
+                )
+        if max(model.ranges[:2]) < self.spacing:
+            lines.append(
+                f"the fitted variogram's range along the layer, {max(model.ranges[:2]):.4g}, is "
+                f"shorter than the spacing of the holes, {self.spacing:.4g}: between holes "
+                "estimates will be close to the local mean"
+            )
+        return lines
 
 
-def fit_variogram(
+def fit_variogram(  # 9 arguments: a public name; seven of them are choices by keyword
     points: Floats,
     values: Floats,
     *,
-    anisotropy: Anisotropy = "transverse",
+    holes: Ints | None = None,
+    anisotropy: Anisotropy = "auto",
     rotation: Triple = (0.0, 0.0, 0.0),
     kinds: Sequence[str] = KINDS,
+    structures: int = 2,
+    weights: Weights = "likelihood",
+    scores: bool = True,
 ) -> FittedVariogram:
-    """Fit a nugget and one structure to samples.
+    """Fit a nugget and one or two structures to samples.
 
     Parameters
     ----------
@@ -83,24 +153,35 @@ def fit_variogram(
         Samples in the unfolded space.
     values : (n,) float
         Grades.
-    anisotropy : {"transverse", "isotropic", "orthotropic"}
-        Transverse: one range along the layer (the first two axes) and one across it.
+    holes : (n,) int, optional
+        Number of each sample's hole: down-hole lags then show the nugget.
+    anisotropy : {"auto", "isotropic", "transverse", "orthotropic"}
+        Transverse: one range along the layer (the first two axes) and one across it. Orthotropic:
+        two along the layer, in directions that are found. Auto: transverse or orthotropic.
     rotation : (float, float, float)
         Bearing, plunge and dip of the axes, degrees, as in `Variogram`.
     kinds : names
-        Structures to try; the one with the smallest misfit is returned.
+        Structures to try: spherical, exponential, gaussian, matern (of smoothness 1.5).
+    structures : int
+        Most structures, 1 or 2.
+    weights : {"likelihood", "near", "cressie"}
+        Restricted maximum likelihood on subsets of holes, or least squares on bins of pairs that
+        weighs near lags, or all lags by Cressie's weights. Least squares fits one structure, and
+        turns no axes.
+    scores : bool
+        Whether the structure is that of the grades' normal scores, carried back to the grades.
 
     Returns
     -------
     FittedVariogram
-        The model of the smallest misfit, with its bins.
+        The model of the largest likelihood (least squares: of the smallest misfit), with bins.
 
     Raises
     ------
     InputError
         There are fewer than 20 samples or too few pairs, or all values are equal.
     OptionError
-        The anisotropy or a kind is not a valid one.
+        The anisotropy, a kind, the weights or the number of structures is not a valid one.
 
     Examples
     --------
@@ -109,245 +190,192 @@ def fit_variogram(
     >>> fitted.model.nugget > 0.7  # noise has no correlation
     True
     """
-    P, v = _checked(points, values, anisotropy, kinds)
-    P, v = _thinned(P, v)
+    P, v, own = checked(points, values, holes, anisotropy, kinds)
+    if weights not in WEIGHTS:
+        raise OptionError(f"weights {weights!r} are not one of: {', '.join(WEIGHTS)}")
+    if structures not in (1, 2):
+        raise OptionError(f"structures must be 1 or 2, not {structures!r}")
     rotation = numbers("the rotation", rotation, 3)
     local = P @ turned(*rotation).T
-    cells = _cells(local, v, anisotropy)
-    if len(cells) < 6:
-        raise InputError(
-            f"only {len(cells)} bins of {_PAIRS} pairs or more: too few samples for a variogram; "
-            "give a variogram model"
-        )
-    best = min((_fitted(cells, kind, anisotropy, v) for kind in kinds), key=lambda f: f[0])
-    misfit, kind, nugget, sill, ranges = best
-    structures = (Structure(kind, sill, _three(ranges, anisotropy)),) if sill > 0 else ()
-    model = Variogram(nugget, structures, rotation)
-    H = cells[["h1", "h2", "h3"]].to_numpy()
-    unturned = Variogram(nugget, structures)
-    return FittedVariogram(model, cells.assign(model=unturned.gamma(H)), misfit, anisotropy)
+    extent = _extent(local)
+    bounds: tuple[str, ...] = ()
+    value = float("nan")
+    with one_thread():
+        if weights == "likelihood":
+            shape, variance, used = _likeliest(
+                local, v, own, (anisotropy, tuple(kinds), structures, scores)
+            )
+            model = _model_of(shape, variance, rotation)
+            bounds, value = shape.bounds, shape.value
+        else:
+            used = "transverse" if anisotropy == "auto" else anisotropy
+            model = _least_squares(local, v, used, kinds, near=weights == "near")
+            model = replace(model, rotation=rotation)
+    cells = _compared(P, v, model, used)
+    ratio = cells["gamma"] / cells["model"].clip(lower=1e-3 * float(cells["gamma"].mean())) - 1
+    misfit = float(np.sqrt((cells["pairs"] * ratio**2).sum() / cells["pairs"].sum()))
+    return FittedVariogram(
+        model, cells, misfit, used, weights, value,
+        None if own is None else down_hole(P, v, own), hole_spacing(local, own), extent, bounds,
+    )  # fmt: skip
 
 
-def directional(
-    points: Floats,
-    values: Floats,
-    *,
-    lags: int = 15,
-    rotation: Triple = (0.0, 0.0, 0.0),
-    tolerance: float = 22.5,
-) -> pd.DataFrame:
-    """Return experimental variograms along each axis, in the plane of axes 1 and 2, and in all.
+def hole_spacing(local: Floats, holes: Ints | None) -> float:
+    """Return the median distance in the plane of axes 1 and 2 from a hole to the nearest other.
 
     Parameters
     ----------
-    points : (n, 3) float
-        Samples.
-    values : (n,) float
-        Grades.
-    lags : int
-        Number of lags in half the extent along each direction.
-    rotation : (float, float, float)
-        Bearing, plunge and dip of the axes, degrees, as in `Variogram`.
-    tolerance : float
-        Largest angle between a pair and the direction, degrees. A pair in the plane lies at most
-        one lag of the third axis off it. A pair along that axis lies at most one lag of the plane
-        off it.
-
-    Returns
-    -------
-    DataFrame
-        Columns direction (axis_1, axis_2, along, across, all), distance (mean), gamma, pairs.
-
-    Raises
-    ------
-    InputError
-        There are fewer than 20 samples, or all values are equal.
+    local : (n, 3) float
+        Samples along the axes.
+    holes : (n,) int or None
+        Number of each sample's hole; without, each place in the plane counts as one.
     """
-    P, v = _checked(points, values, "transverse", KINDS)
-    P, v = _thinned(P, v)
-    local = P @ turned(*numbers("the rotation", rotation, 3)).T
-    longest = _SHARE * np.ptp(local, axis=0)
-    plane = float(max(longest[0], longest[1]))
-    width = {"along": plane / lags, "across": float(longest[2]) / lags}
-    slope = np.tan(np.radians(tolerance))
-    reach = {
-        **dict.fromkeys(("axis_1", "axis_2", "along"), plane),
-        "across": float(longest[2]),
-        "all": plane,
-    }
-    sums = {name: np.zeros((3, lags)) for name in reach}
-    for h, square in _pairs(local, v):
-        flat = np.hypot(h[:, 0], h[:, 1])
-        level = (h[:, 2] <= slope * flat) & (h[:, 2] <= width["across"])
-        upright = (flat <= slope * h[:, 2]) & (flat <= width["along"])
-        chosen = {
-            "axis_1": (level & (h[:, 1] <= slope * h[:, 0]), flat),
-            "axis_2": (level & (h[:, 0] <= slope * h[:, 1]), flat),
-            "along": (level, flat),
-            "across": (upright, h[:, 2]),
-            "all": (np.ones(len(h), dtype=bool), np.linalg.norm(h, axis=1)),
-        }
-        for name, (some, distance) in chosen.items():
-            lag = np.floor(distance / reach[name] * lags) if reach[name] > 0 else distance
-            some = some & (lag < lags)
-            index = lag[some].astype(np.int64)
-            for row, weight in enumerate((np.ones(len(index)), distance[some], square[some])):
-                sums[name][row] += np.bincount(index, weight, minlength=lags)
-    frames = []
-    for name, (pairs, distance, square) in sums.items():
-        there = pairs > 0
-        frames.append(
-            pd.DataFrame(
-                {
-                    "direction": name,
-                    "distance": distance[there] / pairs[there],
-                    "gamma": 0.5 * square[there] / pairs[there],
-                    "pairs": pairs[there].astype(np.int64),
-                }
-            )
-        )
-    return pd.concat(frames, ignore_index=True)
+    from scipy.spatial import cKDTree
 
-
-def _checked(
-    points: Floats, values: Floats, anisotropy: str, kinds: Sequence[str]
-) -> tuple[Floats, Floats]:
-    """Return the finite samples sorted by place; raise if no variogram can be fitted to them."""
-    if anisotropy not in ANISOTROPIES:
-        raise OptionError(f"anisotropy {anisotropy!r} is not one of: {', '.join(ANISOTROPIES)}")
-    for kind in kinds:
-        if kind not in KINDS:
-            raise OptionError(f"structure {kind!r} is not one of: {', '.join(KINDS)}")
-    P, v = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    if P.ndim != 2 or P.shape[1] != 3 or v.shape != (len(P),):
-        raise InputError(f"samples need points (n, 3) and values (n,), not {P.shape}, {v.shape}")
-    good = np.isfinite(P).all(axis=1) & np.isfinite(v)
-    P, v = P[good], v[good]
-    if len(v) < FEWEST_SAMPLES:
-        raise InputError(f"only {len(v)} samples: a variogram needs at least {FEWEST_SAMPLES}")
-    if not np.ptp(v) > 0:
-        raise InputError("all samples have the same value: no variogram can be fitted")
-    order = np.lexsort((v, *P.T))
-    return P[order], v[order]
-
-
-def _thinned(P: Floats, v: Floats) -> tuple[Floats, Floats]:
-    if len(v) <= MOST_SAMPLES:
-        return P, v
-    some = np.sort(np.random.default_rng(0).choice(len(v), MOST_SAMPLES, replace=False))
-    return P[some], v[some]
-
-
-def _pairs(local: Floats, v: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """Yield distances along the axes (p, 3) and squared differences (p,) of all pairs, in parts."""
-    n = len(v)
-    for start in range(0, n - 1, _ROWS):
-        stop = min(start + _ROWS, n - 1)
-        i = np.repeat(np.arange(start, stop), n - 1 - np.arange(start, stop))
-        j = np.concatenate([np.arange(k + 1, n) for k in range(start, stop)])
-        yield np.abs(local[i] - local[j]), (v[i] - v[j]) ** 2
-
-
-def _cells(local: Floats, v: Floats, anisotropy: str) -> pd.DataFrame:
-    """Return the bins that hold enough pairs."""
-    axes = {"isotropic": 1, "transverse": 2, "orthotropic": 3}[anisotropy]
-    bins = _BINS[axes]
-    extent = np.ptp(local, axis=0)
-    if anisotropy == "isotropic":
-        longest = np.array([_SHARE * np.linalg.norm(extent)])
-    elif anisotropy == "transverse":
-        longest = _SHARE * np.array([np.hypot(extent[0], extent[1]), extent[2]])
+    flat = local[:, :2]
+    if holes is None:
+        centres = np.unique(flat, axis=0)
     else:
-        longest = _SHARE * extent
-    longest = np.where(longest > 0, longest, 1.0)
-    total = np.zeros((5, bins**axes))
-    for h, square in _pairs(local, v):
-        lag = _lags(h, anisotropy)
-        inside = (lag < longest).all(axis=1)
-        where = ((lag[inside] / longest) ** (1 / _FINER) * bins).astype(np.int64)
-        index = np.ravel_multi_index(tuple(where.T), (bins,) * axes)
-        weights = [
-            np.ones(len(index)),
-            square[inside],
-            *np.pad(lag[inside], ((0, 0), (0, 3 - axes))).T,
-        ]
-        for row, weight in enumerate(weights):
-            total[row] += np.bincount(index, weight, minlength=bins**axes)
-    there = total[0] >= _PAIRS
-    pairs = total[0, there]
-    h = total[2:, there] / pairs
-    if anisotropy == "transverse":
-        h = h[[0, 2, 1]]
-    return pd.DataFrame(
-        {
-            **dict(zip(("h1", "h2", "h3"), h, strict=True)),
-            "gamma": 0.5 * total[1, there] / pairs,
-            "pairs": pairs.astype(np.int64),
-        }
+        _, place, count = np.unique(holes, return_inverse=True, return_counts=True)
+        sums = [np.bincount(place.ravel(), flat[:, k]) for k in range(2)]
+        centres = np.column_stack(sums) / count[:, None]
+    if len(centres) < 2:
+        return float("nan")
+    return float(np.median(np.asarray(cKDTree(centres).query(centres, k=2)[0])[:, 1]))
+
+
+def _extent(local: Floats) -> Triple:
+    """Return the samples' extent along the axes: its diagonal in the plane, and across."""
+    x, y, z = np.ptp(local, axis=0).tolist()
+    flat = float(np.hypot(x, y))
+    return flat, flat, z
+
+
+def _likeliest(
+    local: Floats,
+    v: Floats,
+    holes: Ints | None,
+    how: tuple[str, tuple[str, ...], int, bool],
+) -> tuple[Shape, float, str]:
+    """Return the shape of the largest likelihood, its variance and its anisotropy."""
+    anisotropy, kinds, structures, scores = how
+    P, v, holes = _one_each(local, v, holes)
+    y = normal_scores(v) if scores else (v - v.mean()) / v.std()
+    subsets = Subsets(P, y, holes)
+    extent = np.array(_extent(P))
+    if anisotropy == "isotropic":
+        extent[:] = np.linalg.norm(np.ptp(P, axis=0))
+    extent = np.where(extent > 0, extent, 1.0)
+    low, high = _BOUNDS[0] * extent, _BOUNDS[1] * extent
+    penalty = 0.5 * np.log(len(P))
+    shares = hermite_shares(v) if scores else None
+    left_out = LeftOut(P, v, holes)
+
+    def better(more: Shape, less: Shape, parameters: int) -> bool:
+        if more.value + parameters * penalty >= less.value or not _plausible(more, extent):
+            return False
+        new, old = (
+            left_out.errors(_model_of(_of_grades(s, shares), 1.0, (0.0, 0.0, 0.0)))
+            for s in (more, less)
+        )
+        return bool((new**2).sum() < (old**2).sum())
+
+    plain = "transverse" if anisotropy == "auto" else anisotropy
+    start, _ = first_shape(subsets, plain, low, high)
+    tried = []
+    for kind in kinds:
+        tried.append(subsets.fit((kind,), plain, start, low, high))
+        start = tried[0].vector
+    best, found = min(tried, key=lambda shape: shape.value), plain
+    if anisotropy == "auto":
+        start, _ = first_shape(subsets, "orthotropic", low, high)
+        other = subsets.fit(best.kinds, "orthotropic", start, low, high)
+        if better(other, best, 2):
+            best, found = other, "orthotropic"
+    if structures == 2:
+        nested = _nested(subsets, best, found, low, high)
+        if better(nested, best, 2 + max(AXES[found])):
+            best = nested
+    variance = float(v.var()) * subsets.variance(best, found) / float(y.var())
+    return _of_grades(best, shares), variance, found
+
+
+def _of_grades(shape: Shape, shares: Floats | None) -> Shape:
+    """Return the model of the grades; without Hermite shares it is the shape itself."""
+    return shape if shares is None else shape_of_grades(shape, shares)
+
+
+def _nested(subsets: Subsets, one: Shape, anisotropy: str, low: Floats, high: Floats) -> Shape:
+    """Return the best model of two structures of a kind, one shorter and one longer than one."""
+    nugget, sill = one.shares
+    shares = np.array([nugget, sill / 2, sill / 2])
+    ranges = np.clip(one.ranges * np.array([[0.4], [1.6]]), 1.01 * low, 0.99 * high)
+    start = packed(shares, ranges, one.turn, anisotropy)
+    return subsets.fit(one.kinds * 2, anisotropy, start, low, high)
+
+
+def _plausible(shape: Shape, extent: Floats) -> bool:
+    """Return whether no structure is negligible, on a bound, or longer than the samples reach."""
+    inside = (shape.ranges <= extent).all()
+    return bool(inside and shape.shares[1:].min() >= _LEAST_SHARE and not shape.bounds)
+
+
+def _one_each(P: Floats, v: Floats, holes: Ints | None) -> tuple[Floats, Floats, Ints | None]:
+    """Return samples of which those in one place are one, of their mean."""
+    new = np.concatenate([[True], (np.diff(P, axis=0) != 0).any(axis=1)])
+    first = np.flatnonzero(new)
+    count = np.diff(np.append(first, len(P)))
+    return P[new], np.add.reduceat(v, first) / count, None if holes is None else holes[new]
+
+
+def _model_of(shape: Shape, variance: float, rotation: Triple) -> Variogram:
+    """Return the variogram of a shape; of two axes in the plane the first is the longer one."""
+    ranges, turn = shape.ranges, shape.turn
+    if ranges[:, 0].sum() < ranges[:, 1].sum():
+        ranges, turn = ranges[:, [1, 0, 2]], turn + np.pi / 2
+    nugget, *sills = (variance * shape.shares).tolist()
+    parts = [
+        Structure(kind, sill, (float(a), float(b), float(c)))
+        for kind, sill, (a, b, c) in zip(shape.kinds, sills, ranges, strict=True)
+        if sill > 1e-3 * variance
+    ]
+    if parts and {p.kind for p in parts} == {"gaussian"}:
+        nugget = max(nugget, _NUGGET * variance)
+    if not parts:
+        nugget = variance
+    if (ranges[:, 0] != ranges[:, 1]).any():
+        c, s = np.cos(turn), np.sin(turn)
+        axes = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ turned(*rotation)
+        bearing, plunge, dip = angles_of(axes)
+        rotation = bearing, plunge + 0.0, dip + 0.0  # no -0
+    return Variogram(nugget, tuple(parts), rotation)
+
+
+def _least_squares(
+    local: Floats, v: Floats, anisotropy: str, kinds: Sequence[str], *, near: bool
+) -> Variogram:
+    """Return the model of the smallest misfit to bins of pairs."""
+    cells = _binned(*thinned(local, v), anisotropy)
+    found = (fitted_cells(cells, kind, anisotropy, v, near=near) for kind in kinds)
+    _, kind, nugget, sill, ranges = min(found, key=lambda f: f[0])
+    return Variogram(
+        nugget, (Structure(kind, sill, three(ranges, anisotropy)),) if sill > 0 else ()
     )
 
 
-def _lags(h: Floats, anisotropy: str) -> Floats:
-    """Return the distances (p, axes) by which pairs are binned."""
-    if anisotropy == "isotropic":
-        return np.asarray(np.linalg.norm(h, axis=1)[:, None])
-    if anisotropy == "transverse":
-        return np.column_stack([np.hypot(h[:, 0], h[:, 1]), h[:, 2]])
-    return h
+def _binned(local: Floats, v: Floats, anisotropy: str) -> pd.DataFrame:
+    cells = cells_of(local, v, anisotropy)
+    if len(cells) < 6:
+        raise InputError(
+            f"only {len(cells)} bins of {PAIRS} pairs or more: too few samples for a variogram; "
+            "give a variogram model"
+        )
+    return cells
 
 
-def _three(ranges: Floats, anisotropy: str) -> Triple:
-    """Return one range per axis."""
-    which = {"isotropic": [0, 0, 0], "transverse": [0, 0, 1], "orthotropic": [0, 1, 2]}[anisotropy]
-    a, b, c = np.asarray(ranges)[which].tolist()
-    return a, b, c
-
-
-def _fitted(
-    cells: pd.DataFrame, kind: str, anisotropy: str, v: Floats
-) -> tuple[float, str, float, float, Floats]:
-    """Return misfit, kind, nugget, sill and ranges of the best model of a kind."""
-    H = cells[["h1", "h2", "h3"]].to_numpy()
-    gamma, pairs = cells["gamma"].to_numpy(), cells["pairs"].to_numpy(dtype=np.float64)
-    used = {"isotropic": [0], "transverse": [0, 2], "orthotropic": [0, 1, 2]}[anisotropy]
-    longest = H[:, used].max(axis=0)
-    longest = np.where(longest > 0, longest, 1.0)
-    low, high = np.log(0.02 * longest), np.log(3.0 * longest)
-    tries = []
-    for start in _STARTS:
-        x = np.log(start * longest)
-        root = np.sqrt(pairs / _fading(H, _STARTS[0] * np.maximum(H.max(axis=0), 1e-300)))
-        for _ in range(_ROUNDS):
-
-            def residual(x: Floats, root: Floats = root) -> Floats:
-                model = _best_sills(H, gamma, root, kind, x, anisotropy)[2]
-                return np.asarray(root * (model - gamma) / gamma.mean())
-
-            x = least_squares(residual, x, bounds=(low, high), diff_step=[1e-4]).x
-            nugget, sill, model = _best_sills(H, gamma, root, kind, x, anisotropy)
-            model = np.maximum(model, 1e-3 * gamma.mean())
-            root = np.sqrt(pairs / _fading(H, _three(np.exp(x), anisotropy))) * gamma.mean() / model
-        misfit = float(np.sqrt((pairs * (gamma / model - 1) ** 2).sum() / pairs.sum()))
-        tries.append((misfit, nugget, sill, x))
-    misfit, nugget, sill, x = min(tries, key=lambda t: t[0])
-    if kind == "gaussian" and nugget < _NUGGET * (nugget + sill):
-        nugget = _NUGGET * (nugget + sill)
-    if nugget + sill <= 0:
-        nugget = float(v.var())
-    return misfit, kind, nugget, sill, np.exp(x)
-
-
-def _fading(H: Floats, ranges: Floats | Triple) -> Floats:
-    """Return the divisors of the bins' weights: squared distances in ranges, plus `_NEAR`."""
-    return np.asarray(_NEAR + ((H / np.asarray(ranges)) ** 2).sum(axis=1))
-
-
-def _best_sills(
-    H: Floats, gamma: Floats, root: Floats, kind: str, x: Floats, anisotropy: str
-) -> tuple[float, float, Floats]:
-    """Return the nugget and sill by least squares for given ranges, and the model's gamma."""
-    ranges = np.asarray(_three(np.exp(x), anisotropy))
-    shape = 1 - correlation(kind, np.linalg.norm(H / ranges, axis=1))
-    A = np.column_stack([np.ones(len(shape)), shape])
-    (nugget, sill), _ = nnls(A * root[:, None], gamma * root)
-    return float(nugget), float(sill), np.asarray(nugget + sill * shape)
+def _compared(P: Floats, v: Floats, model: Variogram, anisotropy: str) -> pd.DataFrame:
+    """Return the bins along the model's axes, with the model's semivariance."""
+    P, v = thinned(P, v)
+    cells = _binned(P @ model.axes.T, v, anisotropy)
+    unturned = replace(model, rotation=(0.0, 0.0, 0.0))
+    return cells.assign(model=unturned.gamma(cells[["h1", "h2", "h3"]].to_numpy()))

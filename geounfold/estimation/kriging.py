@@ -264,7 +264,7 @@ class _Job:
             (values - centre) / scale,
             counts,
             model.nugget / sill,
-            [(kind, part / sill, *more) for kind, part, *more in model.parts],
+            [(kind, part / sill, lengths, s) for kind, part, lengths, s in model.parts],
             None if self.mean is None else 0.0,
         )
         wrong = ~(variance <= _WORST)

@@ -12,6 +12,8 @@ from geounfold.estimation.variogram import Triple, numbers
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.geometry.rotations import rotation_from_angles as turned
 
+_ROWS = 65_536  # targets searched at a time
+
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbourhood:
@@ -145,11 +147,55 @@ class Search:
             keep &= hole != own[:, None]
         if self._near.max_per_hole is not None:
             hole = np.where(keep, hole, -1)
-            keep &= _turn(hole) < self._near.max_per_hole
+            keep &= turn_of(hole) < self._near.max_per_hole
         return keep
 
 
-def _turn(groups: Ints) -> Ints:
+def least_factor(
+    near: Neighbourhood,
+    points: Floats,
+    holes: Ints | None,
+    targets: Floats,
+    own: Ints | None = None,
+) -> Floats:
+    """Return the factor of the radii at which each target has its fewest samples, (m,).
+
+    Parameters
+    ----------
+    near : Neighbourhood
+        Radii, fewest samples and most samples of a hole.
+    points, holes
+        Samples, as `Search` takes them.
+    targets : (m, 3) float
+        Targets.
+    own : (m,) int, optional
+        The hole that is left out for each target.
+
+    Returns
+    -------
+    factor : (m,) float
+        NaN for a target that has too few samples at any distance, and for rows of NaN.
+    """
+    there = np.flatnonzero(np.isfinite(targets).all(axis=1))
+    out = np.full(len(targets), np.nan)
+    everything = np.concatenate([points, targets[there]])
+    wide = 2 * float(np.linalg.norm(np.ptp(near.measured(everything), axis=0))) + 1.0
+    a, b, c = (wide * r for r in near.radii)
+    wider = Neighbourhood(
+        radii=(a, b, c), rotation=near.rotation, min_samples=near.min_samples,
+        max_samples=near.min_samples, max_per_hole=near.max_per_hole,
+    )  # fmt: skip
+    search = Search(points, holes, wider)
+    for start in range(0, len(there), _ROWS):
+        rows = there[start : start + _ROWS]
+        found = search.find(targets[rows], None if own is None else own[rows])
+        last = points[found.rows[:, -1]] - targets[rows]
+        enough = found.counts >= near.min_samples
+        out[rows] = np.where(enough, np.linalg.norm(near.measured(last), axis=1), np.nan)
+    return out
+
+
+def turn_of(groups: Ints) -> Ints:
     """Return for each entry the number of equal entries before it in its row."""
     order = np.argsort(groups, axis=1, kind="stable")
     ordered = np.take_along_axis(groups, order, axis=1)

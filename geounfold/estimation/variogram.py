@@ -196,9 +196,7 @@ class Variogram:
         h = np.asarray(separation, dtype=np.float64) @ self.axes.T
         left = np.zeros(len(h))
         for s in self.structures:
-            left += s.sill * correlation(
-                s.kind, np.linalg.norm(h / s.ranges, axis=1), s.smoothness
-            )
+            left += s.sill * correlation(s.kind, np.linalg.norm(h / s.ranges, axis=1), s.smoothness)
         return np.where((h == 0).all(axis=1), 0.0, self.sill - left)
 
     def to_gstlearn(self) -> Any:

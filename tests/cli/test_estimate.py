@@ -59,6 +59,23 @@ def test_blocks_come_back_with_estimates(files, tmp_path: Path) -> None:
     assert again.read_bytes() == out.read_bytes()
 
 
+def test_the_variogram_goes_out_and_in_as_a_file(files, tmp_path: Path, capsys) -> None:
+    out, again, model = tmp_path / "out.csv", tmp_path / "again.csv", tmp_path / "v.toml"
+    assert main(words(files, out, "--variogram-out", str(model), "--quiet")) == 0
+    assert "[[structures]]" in model.read_text(encoding="utf-8")
+    assert main(words(files, again, "--variogram", str(model), "--quiet")) == 0
+    assert again.read_bytes() == out.read_bytes()
+    assert (pd.read_csv(out).CU_flag == "estimated").all()  # radii leave none empty
+    capsys.readouterr()
+    model.write_text(model.read_text(encoding="utf-8").replace("sill", "sil"), encoding="utf-8")
+    assert main(words(files, again, "--variogram", str(model), "--overwrite", "--quiet")) == 2
+    assert "v.toml: each structure needs exactly kind, sill and ranges" in capsys.readouterr().err
+    method = ("--method", "inverse_distance", "--radii", "60,60,20")
+    how = ("--variogram-out", str(tmp_path / "w.toml"), "--overwrite", "--quiet")
+    assert main(words(files, out, *method, *how)) == 2
+    assert "inverse_distance has no variogram" in capsys.readouterr().err
+
+
 def test_few_samples_are_flagged_and_told(files, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out.csv"
     more = ("--variogram", files["v.json"], "--radii", "3,3,3", "--json")

@@ -26,11 +26,13 @@ results, for a grade CU:
 
 SAMPLES and BLOCKS are in the folded space; the map carries both. The variogram
 and the search are in the unfolded space: the first two axes lie in the layer,
-the third across it. The summary holds the variogram as --variogram reads it:
-  {"nugget": 0.1, "rotation": [0, 0, 0], "structures":
-   [{"kind": "spherical", "sill": 0.9, "ranges": [150, 150, 20]}]}
-kinds: spherical, exponential, gaussian; rotation: bearing, plunge and dip of
-the axes, in degrees.
+the third across it. --variogram-out writes the model as --variogram reads it:
+  nugget = 0.1
+  rotation = [0, 0, 0]       # bearing, plunge and dip of the axes, in degrees
+  [[structures]]             # one or more
+  kind = "spherical"         # or exponential, gaussian, matern (smoothness)
+  sill = 0.9
+  ranges = [150, 150, 20]
 
 Needs: pip install 'geounfold[geostat]'"""
 
@@ -64,6 +66,7 @@ def add_estimate(commands: Any) -> Parser:
     group.add("-o", "--output", metavar="OUT", required=True, help="BLOCKS with the estimates")
     group.add("--report", metavar="R.html", help="a page: the grades in 3-D, folded and flat")
     group.add("--summary", metavar="S.json", help="options, variogram, figures, warnings")
+    group.add("--variogram-out", metavar="V.toml", help="the variogram, to edit and give back")
     group.add(
         "--cross-validate",
         action="store_true",
@@ -78,8 +81,8 @@ def add_estimate(commands: Any) -> Parser:
     )
     group.add(
         "--variogram",
-        metavar="V.json",
-        help="a model, or a summary that holds one (default: fitted)",
+        metavar="V.toml",
+        help="a model, or a summary (.json) that holds one (default: fitted)",
     )
     group.add(
         "--decluster",
@@ -110,7 +113,8 @@ def _add_search(parser: Parser) -> None:
     group.add(
         "--radii",
         metavar="A,B,C",
-        help="radii of the search (default twice the variogram's ranges)",
+        help="radii of the search (default: twice the variogram's ranges, or as\n"
+        "much more as the blocks need)",
     )
     group.add(
         "--rotation",

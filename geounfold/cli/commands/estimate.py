@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from geounfold.cli.answers.estimate_report import write_estimate_report
-from geounfold.cli.answers.file_endings import HTML, JSON, POINTS_OUT
+from geounfold.cli.answers.file_endings import HTML, JSON, POINTS_OUT, TOML
 from geounfold.cli.domains.estimate import estimate_by
 from geounfold.cli.domains.maps import domains_of, load_map
 from geounfold.cli.inputs.points import files_given, read_all, read_samples
@@ -31,6 +31,7 @@ def run(args: Namespace, console: Console) -> None:
             "--output": (args.output, POINTS_OUT),
             "--summary": (args.summary, JSON),
             "--report": (args.report, HTML),
+            "--variogram-out": (args.variogram_out, TOML),
         },
         files_given(args.map, args.samples, args.points, args.variogram),
         overwrite=args.overwrite,
@@ -47,6 +48,8 @@ def run(args: Namespace, console: Console) -> None:
     if several is not None:
         if args.report is not None:
             raise OptionError("--report is for one domain: the map holds several")
+        if args.variogram_out is not None:
+            raise OptionError("--variogram-out is for one domain: the map holds several")
         estimate_by(args, console, several, outputs, samples, whole)
         return
     table = PartedTable.chosen(whole)
@@ -57,6 +60,10 @@ def run(args: Namespace, console: Console) -> None:
         table.write(parts["--output"], result.columns)
         if "--summary" in parts:
             write_json(parts["--summary"], summary)
+        if "--variogram-out" in parts:
+            if result.variogram is None:
+                raise OptionError("--variogram-out: inverse_distance has no variogram")
+            parts["--variogram-out"].write_text(result.variogram.to_toml(), encoding="utf-8")
         if "--report" in parts:
             write_estimate_report(parts["--report"], summary, result, one, table, samples)
     for warning in result.warnings():

@@ -130,10 +130,10 @@ def _neighbourhood(args: Namespace) -> dict[str, Any]:
 
 
 def _variogram(path: str) -> Variogram:
-    from geounfold.estimation import from_json
+    from geounfold.estimation import from_json, from_toml
 
     try:
         text = existing_file(Path(path)).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text") from error
-    return from_json(text, path)
+    return from_toml(text, path) if path.lower().endswith(".toml") else from_json(text, path)

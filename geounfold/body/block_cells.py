@@ -12,7 +12,7 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geounfold.geometry.measures import sorted_distinct
+from geounfold.geometry.measures import bounds, sorted_distinct
 from geounfold.geometry.mesh import Bools, Ints, Numbers
 
 _MARGIN = 3  # empty cells around the box: offsets of up to 3 cells never wrap into another row
@@ -54,17 +54,20 @@ class OccupiedCells:
         if box.size > _DENSE * len(every):
             keys, row = np.unique(every, return_inverse=True)
         else:
-            keys = np.flatnonzero(np.bincount(every))
-            number = np.zeros(keys[-1] + 1, dtype=np.int64)
+            taken = np.zeros(int(box.size), dtype=bool)
+            taken[every] = True
+            keys = np.flatnonzero(taken)
+            number = np.empty(len(taken), dtype=np.int32 if len(keys) < 2**31 else np.int64)
             number[keys] = np.arange(len(keys))
-            row = number[every]
+            row = number[every].astype(np.int64)
         return cls(keys, box.low, box.shape), row
 
     @classmethod
     def _box(cls, cells: Ints) -> OccupiedCells:
         """Return the box around cells, none of them occupied."""
-        low = cells.min(axis=0) - _MARGIN
-        return cls(np.zeros(0, np.int64), low, cells.max(axis=0) - low + 1 + _MARGIN)
+        first, last = bounds(cells)
+        low = first - _MARGIN
+        return cls(np.zeros(0, np.int64), low, last - low + 1 + _MARGIN)
 
     @property
     def size(self) -> float:
@@ -92,7 +95,9 @@ class OccupiedCells:
 
     def keys_of(self, cells: Ints) -> Ints:
         """Return the keys of cells (k, 3) in the box, (k,)."""
-        out: Ints = (cells - self.low) @ self.stride
+        i, j, k = cells.T
+        low, (far, wide, _) = self.low, self.stride.tolist()
+        out: Ints = (i - low[0]) * far + (j - low[1]) * wide + (k - low[2])
         return out
 
     def cells_of(self, keys: Ints) -> Ints:

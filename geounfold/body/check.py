@@ -15,6 +15,7 @@ from geounfold.body.lattice import (
 )
 from geounfold.body.scattered import nearest_points
 from geounfold.errors import InputError
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Floats
 
 MIN_POINTS = 50
@@ -64,13 +65,13 @@ def check_points(points: Floats, lattice: Lattice | None = None) -> None:
         The distinct points are too few, all in one column, on one line or in one plane, or all on
         one surface and on no lattice.
     """
-    count = len(points) - count_duplicates(points)
-    _check_count(count, len(points))
+    if len(distinct(points[:: len(points) // _SAMPLE + 1])) < MIN_POINTS:
+        _check_count(len(points) - count_duplicates(points), len(points))
     if lattice is None:
-        _check_extent(points, count, point_spacing(points))
+        _check_extent(points, point_spacing(points))
         lattice = measure_lattice(distinct(points))
     else:
-        _check_extent(points, count, float(np.cbrt(lattice.steps.prod())))
+        _check_extent(points, float(np.cbrt(lattice.steps.prod())))
     if lattice is not None and not OccupiedCells.of(lattice_indices(points, lattice)).gappy():
         return
     X = distinct(points)
@@ -92,9 +93,9 @@ def check_units(points: Floats, lattice: Lattice | None) -> None:
     lattice : Lattice or None
         Their lattice.
     """
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = bounds(points)
     extent = high - low
-    far = np.abs(points).max(axis=0)
+    far = np.maximum(np.abs(low), np.abs(high))
     tall = float(extent[2] / extent[:2].max()) if extent[:2].any() else 0.0
     steps = None if lattice is None else np.abs(lattice.steps @ np.abs(lattice.axes))
     if steps is not None:
@@ -132,31 +133,40 @@ def _check_count(count: int, rows: int) -> None:
         )
 
 
-def _check_extent(X: Floats, count: int, spacing: float) -> None:
+def _check_extent(X: Floats, spacing: float) -> None:
     """Raise InputError if the points lie in a column, on a line or in a plane.
 
-    ``count`` is the number of distinct points, ``spacing`` their typical distance.
+    ``spacing`` is their typical distance.
     """
     limit = _FLAT * spacing
-    constant = np.ptp(X, axis=0) < limit
+    low, high = bounds(X)
+    constant = high - low < limit
     if constant.sum() == 2:
         fixed = " and ".join(f"{'xyz'[i]} = {X[0, i]:.10g}" for i in np.flatnonzero(constant))
         raise InputError(
-            f"all {count} points are in one column ({fixed}); "
+            f"all {_count(X)} points are in one column ({fixed}); "
             "give a body that extends in all three directions"
         )
     centred = X - X.mean(axis=0)
-    along = centred @ np.linalg.eigh(centred.T @ centred)[1]
-    across, second = np.ptp(along[:, 0]), np.ptp(along[:, 1])
+    least = np.linalg.eigh(centred.T @ centred)[1][:, :2]
+    if (np.ptp(centred[:: -(-len(X) // _SAMPLE)] @ least, axis=0) >= limit).all():
+        return  # points that some of them span are not flat
+    across, second = np.ptp(centred @ least, axis=0)
     if second < limit:
         raise InputError(
-            f"all {count} points are on one line; give a body that extends in all three directions"
+            f"all {_count(X)} points are on one line; "
+            "give a body that extends in all three directions"
         )
     if across < limit:
         raise InputError(
-            f"all {count} points are in one plane, so the body's thickness is not known (and it is "
-            "unfolded already); give at least two layers of blocks"
+            f"all {_count(X)} points are in one plane, so the body's thickness is not known "
+            "(and it is unfolded already); give at least two layers of blocks"
         )
+
+
+def _count(X: Floats) -> int:
+    """Return the number of distinct points."""
+    return len(X) - count_duplicates(X)
 
 
 def _one_layer_of_points(X: Floats) -> bool:

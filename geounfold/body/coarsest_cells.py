@@ -11,6 +11,7 @@ import numpy as np
 from geounfold.body.block_cells import OccupiedCells
 from geounfold.body.lattice import Lattice, lattice_indices
 from geounfold.body.sub_blocks import FilledCells
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Floats, Ints
 
 _PRIMES = (2, 3, 5, 7)  # cells joined along every axis; one after the other for 4, 6, 8 ...
@@ -50,7 +51,7 @@ def coarsest_cells(
         return None
     centres, own = (points, lattice) if filled is None else (filled.points, filled.lattice)
     cells = lattice_indices(centres, own)
-    low = cells.min(axis=0)
+    low = bounds(cells)[0]
     cells = cells - low
     joined = 1
     while (more := _joinable(cells // joined)) is not None:

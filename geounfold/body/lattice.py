@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from geounfold.backends.threads import cores, over_slices
 from geounfold.errors import InputError
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 SHARE = 0.97
@@ -101,7 +102,8 @@ def measure_lattice(points: Floats) -> Lattice | None:
     """
     if len(points) < 8:
         return None
-    reference = (points.min(axis=0) + points.max(axis=0)) / 2
+    low, high = bounds(points)
+    reference = (low + high) / 2
     X = points - reference
     balls = _balls(X)
     guess = _directions(balls)
@@ -131,7 +133,12 @@ def lattice_indices(points: Floats, lattice: Lattice, origin: Floats | None = No
         Lattice position of the cell (0, 0, 0); the lattice's own by default.
     """
     start = lattice.origin if origin is None else origin
-    cells: Ints = np.rint((points - start) @ lattice.axes.T / lattice.steps).astype(np.int64)
+    cells = np.empty((len(points), 3), np.int64)
+
+    def work(rows: slice) -> None:
+        cells[rows] = np.rint((points[rows] - start) @ lattice.axes.T / lattice.steps)
+
+    over_slices(work, len(points), _SLICE)
     return cells
 
 
@@ -164,7 +171,7 @@ def distinct(points: Floats) -> Floats:
 
     Points that are distinct and in order already are returned unchanged, without sorting.
     """
-    if _in_order(points):
+    if in_order(points):
         return points
     ordered = points[np.lexsort(points.T[::-1])]
     fresh = np.ones(len(points), bool)
@@ -173,7 +180,7 @@ def distinct(points: Floats) -> Floats:
     return out
 
 
-def _in_order(points: Floats) -> bool:
+def in_order(points: Floats) -> bool:
     """Return whether every row comes after the one before it, lexicographically."""
     x, y, z = (points[:-1] < points[1:]).T
     same_x, same_y, _ = (points[:-1] == points[1:]).T

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geounfold.backends.threads import over_slices
 from geounfold.body.block_cells import OccupiedCells, offsets
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
@@ -29,6 +30,7 @@ _SLANT = 1.5
 
 _FILLED = 0.5  # least share of an inner cell off a lattice, because blocks per cell vary
 _OFF = np.array([0.3711, 0.6173, 0.1437])  # of a cell: no grid point lies on a border of cells
+_SLICE = 1 << 14  # blocks at once
 _AXES = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
@@ -126,8 +128,15 @@ def _largest(points: Floats, steps: Floats | None) -> int:
 
 def _places(points: Floats, steps: Floats | None, merge: int) -> Ints:
     """Return the cell of every block, (n, 3)."""
-    at = points / merge + _OFF if steps is None else (np.rint(points / steps) + 0.5) / merge
-    return np.floor(at).astype(np.int64)
+    out = np.empty((len(points), 3), np.int64)
+
+    def work(rows: slice) -> None:
+        own = points[rows]
+        at = own / merge + _OFF if steps is None else (np.rint(own / steps) + 0.5) / merge
+        out[rows] = np.floor(at)
+
+    over_slices(work, len(points), _SLICE)
+    return out
 
 
 def _at(cells: OccupiedCells, values: Floats, step: tuple[int, ...]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from geounfold.body.check import check_points, check_units
 from geounfold.body.coarsest_cells import coarsest_cells
 from geounfold.body.fault_surface import FaultWalls
-from geounfold.body.lattice import Lattice, distinct, measure_lattice, refined
+from geounfold.body.lattice import Lattice, distinct, in_order, measure_lattice, refined
 from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending.mend import WORDS, Mended
 from geounfold.body.mending.record import MendedPlace, places_of
@@ -277,4 +277,4 @@ def _sorted(points: Floats) -> Floats:
 
     Floating-point sums over them then do not depend on the order of the input rows.
     """
-    return points[np.lexsort(points.T[::-1])]
+    return points if in_order(points) else points[np.lexsort(points.T[::-1])]

@@ -12,6 +12,7 @@ from geounfold.body.block_cells import OccupiedCells, connected, offsets
 from geounfold.body.scattered import nearest_points
 from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError, OptionError
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Floats, Ints
 
 SPECK_SHARE = 0.005
@@ -83,7 +84,8 @@ def describe_bodies(points: Floats, labels: Ints) -> tuple[ConnectedPart, ...]:
         The body of each point, from separate_bodies.
     """
     sizes = np.bincount(labels)
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    low, high = bounds(points)
+    middle = (low + high) / 2
     sums = [np.bincount(labels, column) for column in (points - middle).T]
     centres = np.stack(sums, axis=1) / sizes[:, None] + middle
     return tuple(

@@ -10,15 +10,15 @@ positions that blocks surround count as missing blocks and are filled.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from geounfold.body.block_cells import OccupiedCells
-from geounfold.body.lattice import Lattice
-from geounfold.geometry.measures import sorted_distinct
+from geounfold.body.lattice import Lattice, lattice_indices
+from geounfold.geometry.measures import bounds, sorted_distinct
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 MOST_CELLS = 250_000
@@ -98,8 +98,7 @@ def filled_cells(points: Floats, lattice: Lattice | None) -> FilledCells | None:
     """
     if lattice is None:
         return None
-    halves = np.rint((points - lattice.origin) @ lattice.axes.T / (lattice.steps / 2))
-    q = halves.astype(np.int64)
+    q = lattice_indices(points, replace(lattice, steps=lattice.steps / 2))
     sides = _block_sides(q)
     if sides is None:
         return None
@@ -114,7 +113,8 @@ def _block_sides(q: Ints) -> tuple[Ints, Ints, Ints] | None:
 
     All are in half steps of the lattice. None if no splitting into halves explains the centroids.
     """
-    gaps = np.stack([_aligned_gap(q, axis) for axis in range(3)], axis=1)
+    ends = bounds(q)
+    gaps = np.stack([_aligned_gap(q, axis, ends) for axis in range(3)], axis=1)
     fine, first, half = np.zeros(3, np.int64), np.zeros(3, np.int64), np.zeros_like(q)
     for axis in range(3):
         found = _axis_sides(q[:, axis], gaps[:, axis])
@@ -124,13 +124,14 @@ def _block_sides(q: Ints) -> tuple[Ints, Ints, Ints] | None:
     return fine, first, half
 
 
-def _aligned_gap(q: Ints, axis: int) -> Ints:
+def _aligned_gap(q: Ints, axis: int, ends: tuple[Ints, Ints]) -> Ints:
     """Return each centroid's distance to the nearest one on its line along an axis, (n,).
 
-    It is zero for a centroid that is alone on its line.
+    It is zero for a centroid that is alone on its line. ``ends`` are the least and greatest
+    coordinates of all.
     """
     others = [i for i in range(3) if i != axis]
-    first, last = (q[:, [*others, axis]].min(axis=0), q[:, [*others, axis]].max(axis=0))
+    first, last = (side[[*others, axis]] for side in ends)
     size = (last - first + 1).astype(float)
     if size.prod() < 2.0**62:
         a, b, c = ((q[:, k] - f) for k, f in zip([*others, axis], first, strict=True))
@@ -142,10 +143,10 @@ def _aligned_gap(q: Ints, axis: int) -> Ints:
     step = np.diff(line, axis=0)
     same = (step[:, others] == 0).all(axis=1) & (step[:, axis] > 0)
     gap = np.where(same, step[:, axis], np.iinfo(np.int64).max)
-    ends = np.array([np.iinfo(np.int64).max])
-    nearest = np.minimum(np.concatenate([ends, gap]), np.concatenate([gap, ends]))
+    none = np.array([np.iinfo(np.int64).max])
+    nearest = np.minimum(np.concatenate([none, gap]), np.concatenate([gap, none]))
     out = np.empty(len(q), np.int64)
-    out[order] = np.where(nearest == ends[0], 0, nearest)
+    out[order] = np.where(nearest == none[0], 0, nearest)
     return out
 
 
@@ -212,6 +213,8 @@ def _in_thirds(q: Ints, gap: Ints, fine: int, agreeing: int) -> tuple[int, Ints]
     neighbour on the line is as near as a part's. ``agreeing`` blocks agree with equal blocks or
     with halves; thirds must explain clearly more.
     """
+    if agreeing + _CLEAR * len(q) > len(q):
+        return None  # no blocks are left that thirds could explain
     for count in (3, 5):
         parent = count * fine
         for corner in range(parent):

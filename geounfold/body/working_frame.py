@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geounfold.backends.threads import over_slices
 from geounfold.body.lattice import (
     TOLERANCE,
     Lattice,
@@ -39,6 +40,7 @@ _LEANING = np.array([[1.0, 0.141, 0.058], [0.173, 0.9, 0.031], [0.062, 0.027, 0.
 
 _ORDER = 5  # highest order of the moments that choose between axes and signs
 _CHUNK = 4096  # points per pass over the moments
+_SLICE = 1 << 14  # points moved onto the lattice at once
 _CLEAR = 0.01  # least moment that fixes the in-plane direction
 _IN_PLANE = ((2, 0, 0), (1, 2, 0), (1, 0, 2), (2, 0, 1), (1, 0, 1), (3, 0, 0), (4, 0, 0))  # m, a, b
 _SIGNS = np.array([np.diag(s) for s in ((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1))])
@@ -98,11 +100,16 @@ class Frame:
         """
         if self.steps is None:
             return points_work
-        cells = points_work / self.steps
-        whole = np.rint(cells)
-        part = cells - whole
-        on = np.logical_and(part < TOLERANCE, part > -TOLERANCE).all(axis=1, keepdims=True)
-        out: Floats = np.where(on, whole * self.steps + 0.0, points_work)
+        steps, out = self.steps, np.empty((len(points_work), 3))
+
+        def work(rows: slice) -> None:
+            cells = points_work[rows] / steps
+            whole = np.rint(cells)
+            cells -= whole
+            on = np.logical_and(cells < TOLERANCE, cells > -TOLERANCE).all(axis=1, keepdims=True)
+            out[rows] = np.where(on, whole * steps + 0.0, points_work[rows])
+
+        over_slices(work, len(points_work), _SLICE)
         return out
 
     def cells(self, points_work: Floats) -> Ints | None:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from geounfold.errors import InputError
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 _MOST = 1 << 28  # cells of the body's box; more are not kept: 32 MB of bits, 256 MB unpacked
@@ -43,8 +44,8 @@ class BodyCells:
     @classmethod
     def of(cls, cells: Ints, steps: Floats) -> BodyCells | None:
         """Return occupied cells (n, 3); None if their box has more than 2**28 cells."""
-        lowest = cells.min(axis=0)
-        shape = cells.max(axis=0) - lowest + 1
+        lowest, last = bounds(cells)
+        shape = last - lowest + 1
         if np.prod(shape.astype(np.float64)) > _MOST:
             return None
         filled = np.zeros(shape, dtype=bool)

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from geounfold.backends.threads import over_slices
-from geounfold.geometry.measures import lengths_between
+from geounfold.geometry.measures import bounds, lengths_between
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers
 
 _OFFSETS = 640  # offsets tried; 26 neighbours at the edge of a sheet one block thick need some 110
@@ -86,8 +86,9 @@ def lattice_nmd(
     offsets = np.concatenate(shells)
     if k > len(offsets) or not len(cells):
         return None
-    low = cells.min(axis=0) - np.abs(offsets).max(axis=0)
-    shape = cells.max(axis=0) + np.abs(offsets).max(axis=0) - low + 1
+    first, last = bounds(cells)
+    low = first - np.abs(offsets).max(axis=0)
+    shape = last + np.abs(offsets).max(axis=0) - low + 1
     turn = np.argsort(-shape, kind="stable")  # the longest axis varies slowest: narrow windows
     cells, shape, low = cells[:, turn], shape[turn], low[turn]
     if float(np.prod(shape.astype(float))) > 2.0**62:

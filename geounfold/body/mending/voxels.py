@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Bools, Ints
 
 MARGIN = 6
@@ -33,8 +34,9 @@ class VoxelBody:
     @classmethod
     def of(cls, cells: Ints) -> VoxelBody | None:
         """Return the voxel body of cells (n, 3); None if its box were too large."""
-        low = cells.min(axis=0) - MARGIN
-        shape = cells.max(axis=0) - low + 1 + MARGIN
+        first, last = bounds(cells)
+        low = first - MARGIN
+        shape = last - low + 1 + MARGIN
         if float(np.prod(shape.astype(float))) > LARGEST:
             return None
         full = np.zeros(shape, dtype=bool)

@@ -31,6 +31,13 @@ single ones in six bodies of the field suite whose cells were divided in 8 and i
 two cells can be found, so one a quarter as thick as the body's mean is not missed.
 """
 
+_MANY, _LAYERS_MANY = 250_000, 5.0
+"""Number of cells above which fewer layers of merged cells decide, and how many.
+
+A million blocks in 11 layers are searched in 1.0 s of processor in place of 4.0. With 5 layers for
+small bodies too, the parts of all 91 bodies of the field suite stay the same, block by block.
+"""
+
 __all__ = ["Junction", "SheetParts", "sheet_parts"]
 
 
@@ -71,9 +78,10 @@ def sheet_parts(cells: Ints, steps: Floats) -> SheetParts:
 
 
 def _merge(cells: Ints, steps: Floats) -> int:
-    """Return how many cells a side may be one, so that the body is _LAYERS of them thick."""
+    """Return how many cells a side may be one, so that the body is thick enough in them."""
     _, thickness = area_and_thickness(cells * steps, steps)
-    return max(1, int(thickness / float(steps.max()) / _LAYERS))
+    layers = _LAYERS if len(cells) <= _MANY else _LAYERS_MANY
+    return max(1, int(thickness / float(steps.max()) / layers))
 
 
 def _merged(cells: Ints, merge: int) -> Ints:

@@ -139,14 +139,16 @@ def _joined(rays: MedialPoints, middle: Floats, steps: Floats) -> tuple[Ints, In
 
 def _median_around(values: Floats, first: Ints, second: Ints) -> Floats:
     """Return the median of each point's value and those of the points paired with it, (k,)."""
-    own = np.arange(len(values))
+    own, n = np.arange(len(values)), len(values)
+    order = np.argsort(values, kind="stable")
+    rank = np.empty(n, np.int64)
+    rank[order] = own
     point = np.concatenate([first, second, own])
-    value = values[np.concatenate([second, first, own])]
-    order = np.lexsort((value, point))
-    count = np.bincount(point, minlength=len(values))
+    key = np.sort(point * n + rank[np.concatenate([second, first, own])])
+    count = np.bincount(point, minlength=n)
     start = np.cumsum(count) - count
-    low, high = order[start + (count - 1) // 2], order[start + count // 2]
-    out: Floats = (value[low] + value[high]) / 2
+    low, high = (order[key[at] - own * n] for at in (start + (count - 1) // 2, start + count // 2))
+    out: Floats = (values[low] + values[high]) / 2
     return out
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 _PAD = 4  # empty cells around the body: room for the blur
@@ -35,9 +36,10 @@ class Voxels:
     @classmethod
     def of(cls, cells: Ints, steps: Floats) -> Voxels:
         """Return the box around lattice cells (n, 3)."""
-        low = cells.min(axis=0) - _PAD
+        first, last = bounds(cells)
+        low = first - _PAD
         inside = cells - low
-        occupied = np.zeros(inside.max(axis=0) + 1 + _PAD, dtype=bool)
+        occupied = np.zeros(last - low + 1 + _PAD, dtype=bool)
         occupied[tuple(inside.T)] = True
         return cls(occupied, inside, steps, low)
 

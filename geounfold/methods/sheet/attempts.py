@@ -73,8 +73,8 @@ class Case:
         Blocks, or merged blocks, in the same unit; the sheet must reach all of them.
     points : (n, 3) float
         Blocks, working units.
-    sites : Sites or None
-        Lattice sites at the body's surface; None off a lattice.
+    find_sites : callable
+        Returns the lattice sites at the body's surface; None off a lattice.
     unit : int
         Blocks along the side of a cell; 1 if blocks were not merged.
     judged : bool
@@ -87,7 +87,7 @@ class Case:
     samples: HullSamples
     cells: Floats
     points: Floats
-    sites: Sites | None
+    find_sites: Callable[[], Sites | None]
     unit: int
     judged: bool
     smoothing: float
@@ -108,6 +108,11 @@ class Case:
             return self.fit(settings)
         except SplitError:
             return None
+
+    @cached_property
+    def sites(self) -> Sites | None:
+        """Lattice sites at the body's surface; None off a lattice."""
+        return self.find_sites()
 
     @cached_property
     def smooth(self) -> FittedSheet:

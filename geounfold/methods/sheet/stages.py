@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from geounfold.backends.progress import told, within
@@ -61,9 +64,10 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
         unit = 1 if body.coarse is None else body.coarse.merge
         with within(0.0, 0.08):
             medial = medial_sheet(body.split, parameters, body.sheet_options.core)
-        case = case_of(body, medial, unit, None if body.hull is None else _sites(body))
+        case = case_of(body, medial, unit, partial(_sites, body))
         with within(0.08, 0.5):
             trials = _fitted(case)
+        outline = _outline(body, case)
         plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell)
 
         def build(trial: Trial, misfit: float) -> tuple[FittedSheet, Horizons, SheetMesh]:
@@ -71,7 +75,7 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
             told(0.1)
             horizons = _horizons(fitted, case.samples, trial, misfit)
             with within(0.2, 0.95):
-                mesh = build_control(fitted, horizons, body.points, body.blocks, plan)
+                mesh = build_control(fitted, horizons, outline, body.blocks, plan)
             return fitted, horizons, mesh
 
         hull = _judged_by(body, unit)
@@ -103,8 +107,13 @@ def _judged_by(body: PreparedBody, unit: int) -> TriMesh:
     return surface.quartered() if body.hull.method == SOLID else surface
 
 
-def case_of(body: PreparedBody, medial: MedialSheet, unit: int, sites: Sites | None) -> Case:
-    """Return the data that the mid surface is fitted to and judged by."""
+def case_of(
+    body: PreparedBody, medial: MedialSheet, unit: int, find_sites: Callable[[], Sites | None]
+) -> Case:
+    """Return the data that the mid surface is fitted to and judged by.
+
+    Sites are looked for when they are first used: cells too coarse for a body need none.
+    """
     split, hull, coarse = body.split, body.hull, body.coarse
     side = vertex_sum(split.side.astype(float), split.mesh.F, len(split.mesh.V))
     variance = np.zeros(3) if hull is None else hull.blur_variance(body.frame.sides)
@@ -121,7 +130,7 @@ def case_of(body: PreparedBody, medial: MedialSheet, unit: int, sites: Sites | N
         samples=samples,
         cells=body.points if coarse is None else coarse.points,
         points=body.points,
-        sites=sites,
+        find_sites=find_sites,
         unit=unit,
         judged=hull is not None,
         smoothing=body.sheet_options.smoothing,
@@ -129,9 +138,9 @@ def case_of(body: PreparedBody, medial: MedialSheet, unit: int, sites: Sites | N
 
 
 def _sites(body: PreparedBody) -> Sites | None:
-    """Return the lattice sites at the surface of the body; None off a lattice."""
+    """Return the lattice sites at the surface of the body; None without lattice or hull."""
     steps, coarse = body.frame.steps, body.coarse
-    if steps is None:
+    if steps is None or body.hull is None:
         return None
     if coarse is None:
         sites = surface_sites(np.rint(body.points / steps).astype(np.int64), steps)
@@ -142,6 +151,19 @@ def _sites(body: PreparedBody) -> Sites | None:
         return sites
     keep = sites.occupied | ~body.walls.past(sites.points)
     return Sites(sites.points[keep], sites.occupied[keep])
+
+
+def _outline(body: PreparedBody, case: Case) -> Floats:
+    """Return the blocks that the control mesh is laid out by, (k, 3): all, if none are merged.
+
+    Of merged blocks they are those at the surface, and the cells' middles: every place of the mid
+    surface over which blocks lie has some of them, and the highest and lowest ones.
+    """
+    if body.coarse is None:
+        return body.points
+    sites, coarse = case.sites, body.coarse
+    shell = body.points[coarse.border] if sites is None else sites.points[sites.occupied]
+    return np.concatenate([shell, coarse.merge * coarse.points])
 
 
 def _fitted(case: Case) -> tuple[Trial, ...]:

@@ -86,7 +86,7 @@ def run_members(body: PreparedBody, result: SheetResult, count: int) -> Spread:
         points = points[scatter(points) < MOST_POINTS / len(points)]
     places = FlatPlaces.of(trial.fitted, points, parameters)
     steps = np.ones(3) if body.frame.steps is None else body.frame.steps
-    case = case_of(body, result.medial, unit, None)  # the sites used are those of the trial
+    case = case_of(body, result.medial, unit, lambda: None)  # the sites used are those of the trial
     base = Base(case, trial, steps, places)
     flat = places.place(trial.fitted)
     moved: dict[str, list[Floats]] = {name: [] for name in (*FITTED, *DERIVED)}

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from geounfold.geometry.measures import sorted_distinct
+from geounfold.geometry.measures import bounds, sorted_distinct
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
 PIT = 13
@@ -50,10 +50,11 @@ def surface_sites(cells: Ints, steps: Floats, judged: Bools | None = None) -> Si
         Distinct blocks whose neighbours are examined; all by default.  The blocks must include
         their neighbours, and the neighbours of empty sites next to them.
     """
-    low = cells.min(axis=0) - 1
-    shape = cells.max(axis=0) - low + 2
+    first, last = bounds(cells)
+    low = first - 1
+    shape = last - low + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    every = (cells - low) @ stride
+    every = sum(column * step for column, step in zip((cells - low).T, stride, strict=True))
     keys = among = sorted_distinct(every)  # sorted, so that shifted keys are looked up in order
     if judged is not None:
         keys = sorted_distinct(every[judged])

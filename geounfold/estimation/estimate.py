@@ -24,6 +24,7 @@ from geounfold.estimation.kriging import (
     krige,
 )
 from geounfold.estimation.neighbourhood import Neighbourhood, least_factor
+from geounfold.estimation.position_error import with_position_error
 from geounfold.estimation.scores import Conservation, conservation
 from geounfold.estimation.variogram import Triple, Variogram
 from geounfold.geometry.mesh import Floats
@@ -70,6 +71,9 @@ class Estimation:
     widened : (float, int) or None
         Factor by which the search radii exceed twice the variogram's ranges, and the number of
         blocks that need it; None if no block does, or the user gave the radii.
+    position_error : (float, float) or None
+        Standard deviations of a place along and across the layers, with which the variogram was
+        blurred for kriging; None if places count as exact.
     """
 
     grade: str
@@ -83,6 +87,7 @@ class Estimation:
     declustering: Declustering | None = None
     body_known: bool = True
     widened: tuple[float, int] | None = None
+    position_error: tuple[float, float] | None = None
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -115,8 +120,12 @@ class Estimation:
                 "cross-validation leaves out whole holes: give the name of the samples' hole column"
             )
         return cross_validate(
-            s.points, s.grades, s.holes, self.variogram, self.neighbourhood, method=self.method
+            s.points, s.grades, s.holes, self._kriged_with, self.neighbourhood, method=self.method
         )
+
+    @property
+    def _kriged_with(self) -> Variogram | None:
+        return _blurred(self.variogram, self.position_error)
 
     def conservation(self, volumes: Floats, volume_ratio: Floats) -> Conservation:
         """Return the metal of the estimates in both spaces, as `scores.conservation`."""
@@ -160,6 +169,7 @@ class Estimation:
             "method": self.method,
             "support": "points at the blocks' centroids",
             "variogram": None if self.variogram is None else self.variogram.facts(),
+            "position_error": self.position_error,
             "variogram_fitted": self.fitted is not None,
             "variogram_fit": None if self.fitted is None else self.fitted.facts(),
             "variogram_misfit": None if self.fitted is None else self.fitted.misfit,
@@ -180,7 +190,7 @@ class Estimation:
         }
 
 
-def estimate(  # 17 arguments: a public name; thirteen of them are choices by keyword
+def estimate(  # 18 arguments: a public name; fourteen of them are choices by keyword
     unfolding: Any,
     samples: pd.DataFrame,
     blocks: pd.DataFrame | Floats | None = None,
@@ -199,6 +209,7 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
     soft_boundary: float = 0.0,
     all_blocks: bool = False,
     cells: Any = None,
+    position_error: tuple[float, float] | None = None,
 ) -> Estimation:
     """Estimate a grade on folded blocks from folded samples, in the unfolded space.
 
@@ -243,6 +254,11 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
         Sides of the cells that weigh clustered samples, in the unfolded space (`decluster`). The
         weights are for statistics, and for the mean of simple kriging.
 
+    position_error : (float, float), optional
+        Standard deviations of a place along and across the layers, in the points' unit, by which
+        the variogram is blurred (`with_position_error`). The default is that of an Unfolding with
+        uncertainty, and none of others.
+
     Returns
     -------
     Estimation
@@ -282,10 +298,12 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
     if variogram is None and (method != "inverse_distance" or _needs_radii(neighbourhood)):
         fitted = fit_variogram(flat.points, flat.grades, holes=flat.holes)
         variogram = fitted.model
+    if position_error is None and getattr(unfolding, "uncertainty", None) is not None:
+        position_error = unfolding.uncertainty.mean
     targets = np.where(own[:, None], carried.points, np.nan)
     near, widened = _neighbourhood(neighbourhood, variogram, flat, targets)
     found = krige(
-        flat.points, flat.grades, targets, variogram, near,
+        flat.points, flat.grades, targets, _blurred(variogram, position_error), near,
         method=method, holes=flat.holes, mean=mean, power=power, workers=workers,
     )  # fmt: skip
     reached = np.isfinite(carried.points).all(axis=1)
@@ -294,8 +312,28 @@ def estimate(  # 17 arguments: a public name; thirteen of them are choices by ke
         variogram = fitted = None
     known = getattr(carrier, "body", None) is not None
     return Estimation(
-        grade, found, carried, flat, method, variogram, fitted, near, weighed, known, widened
+        grade,
+        found,
+        carried,
+        flat,
+        method,
+        variogram,
+        fitted,
+        near,
+        weighed,
+        known,
+        widened,
+        position_error,
     )
+
+
+def _blurred(
+    variogram: Variogram | None, position_error: tuple[float, float] | None
+) -> Variogram | None:
+    """Return the variogram to krige with: that of values at places with an error."""
+    if variogram is None or position_error is None:
+        return variogram
+    return with_position_error(variogram, *position_error)
 
 
 def _rows(given: Any, where: str | None, source: str) -> Any:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from geounfold.errors import check_number
-from geounfold.estimation.variogram import Structure, Variogram
+from geounfold.estimation.variogram import Variogram
 
 _DRAWS = 4096  # normal errors over which a structure is averaged; the share is good to 1 %
 

@@ -59,6 +59,25 @@ def test_blocks_come_back_with_estimates(files, tmp_path: Path) -> None:
     assert again.read_bytes() == out.read_bytes()
 
 
+def test_errors_of_places_widen_the_variance(files, tmp_path: Path, capsys) -> None:
+    summary = tmp_path / "unfolding.json"
+    figures = {"uncertainty": {"sd_along": 5.0, "sd_across": 2.0}}
+    summary.write_text(json.dumps(figures), encoding="utf-8")
+    same = ("--variogram", files["v.json"], "--quiet")
+    outs = {}
+    for error in ("0,0", "5,2", str(summary)):
+        out = tmp_path / f"out{len(outs)}.csv"
+        assert main(words(files, out, *same, "--position-error", error)) == 0
+        outs[error] = pd.read_csv(out)
+    exact, wide, read = outs.values()
+    assert wide.CU_variance.median() > exact.CU_variance.median()
+    pd.testing.assert_frame_equal(wide, read)
+    summary.write_text("{}", encoding="utf-8")
+    out = tmp_path / "none.csv"
+    assert main(words(files, out, *same, "--position-error", str(summary))) == 2
+    assert "no summary of `geounfold unfold --uncertainty`" in capsys.readouterr().err
+
+
 def test_the_variogram_goes_out_and_in_as_a_file(files, tmp_path: Path, capsys) -> None:
     out, again, model = tmp_path / "out.csv", tmp_path / "again.csv", tmp_path / "v.toml"
     assert main(words(files, out, "--variogram-out", str(model), "--quiet")) == 0
@@ -113,6 +132,9 @@ def test_other_methods(files, tmp_path: Path, method: str) -> None:
         (("--mean", "x"), "--mean needs a number"),
         (("--hole", "nobody"), "no column 'nobody'"),
         (("--variogram", "none.json"), "none.json: no such file"),
+        (("--position-error", "1"), "--position-error needs two numbers of 0 or more"),
+        (("--position-error", "1,-2"), "--position-error needs two numbers of 0 or more"),
+        (("--position-error", "none.json"), "none.json: no such file"),
         (("--grade", "AU"), "no column 'AU'"),
         (("--grade", "x"), "names a coordinate"),
     ],

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
+from numpy.testing import assert_allclose
 
+import geounfold as gu
 from geounfold.errors import OptionError
 from geounfold.estimation.position_error import with_position_error
 from geounfold.estimation.variogram import Structure, Variogram
+from geounfold.quality.uncertainty import PositionUncertainty
 
 RANGES = (200.0, 100.0, 20.0)
 
@@ -44,3 +48,24 @@ def test_negative_errors_are_refused(errors: tuple[float, float]) -> None:
     model = Variogram(0.0, (Structure("spherical", 1.0, RANGES),))
     with pytest.raises(OptionError, match="the position error"):
         with_position_error(model, *errors)
+
+
+def test_estimates_use_the_uncertainty_of_an_unfolding_or_what_is_given() -> None:
+    pytest.importorskip("gstlearn")
+    blocks = np.stack(np.meshgrid(*map(np.arange, (20, 16, 3)), indexing="ij"), -1).reshape(-1, 3)
+    blocks = blocks * 10.0
+    u = gu.unfold(blocks)
+    rows = blocks[::7]
+    samples = pd.DataFrame(rows, columns=["x", "y", "z"]).assign(CU=np.sin(rows[:, 0] / 40))
+    model = Variogram(0.01, (Structure("spherical", 0.5, (150.0, 150.0, 30.0)),))
+    exact = gu.estimate(u, samples, None, model, grade="CU")
+    given = gu.estimate(u, samples, None, model, grade="CU", position_error=(5.0, 2.0))
+    u.uncertainty = PositionUncertainty(u.folded, np.tile([5.0, 2.0], (len(blocks), 1)), 8)
+    own = gu.estimate(u, samples, None, model, grade="CU")
+    # Blocks between samples; at a sample's own place the variance stays 0.
+    between = exact.blocks.variance > 0.02
+    assert (given.blocks.variance[between] > exact.blocks.variance[between]).all()
+    assert_allclose(own.blocks.variance, given.blocks.variance, rtol=1e-9)
+    assert exact.summary()["position_error"] is None
+    assert given.summary()["position_error"] == (5.0, 2.0)
+    assert own.variogram == model  # as it was given; it is blurred for kriging only

@@ -85,6 +85,13 @@ def add_estimate(commands: Any) -> Parser:
         help="a model, or a summary (.json) that holds one (default: fitted)",
     )
     group.add(
+        "--position-error",
+        metavar="ALONG,ACROSS",
+        rare=True,
+        help="standard deviations of a place in the unfolded space, as `geounfold unfold\n"
+        "--uncertainty` finds them, or its summary (.json); widens the kriging variance",
+    )
+    group.add(
         "--decluster",
         metavar="X,Y,Z",
         help="cells that weigh clustered samples in statistics: sides, or auto",

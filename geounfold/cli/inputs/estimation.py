@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import asdict
@@ -49,6 +50,7 @@ def estimation(
         raise OptionError(f"--soft-boundary needs 0 or more blocks, not '{args.soft_boundary}'")
     cells = _cells(args.decluster)
     variogram = None if args.variogram is None else _variogram(args.variogram)
+    off = None if args.position_error is None else _position_error(args.position_error)
     from geounfold.estimation import estimate
 
     stage("estimating")
@@ -56,7 +58,7 @@ def estimation(
         saved, _table(samples, args), blocks, variogram,
         grade=args.grade, method=args.method, neighbourhood=near,
         mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
-        soft_boundary=soft, all_blocks=args.all_blocks,
+        soft_boundary=soft, all_blocks=args.all_blocks, position_error=off,
     )  # fmt: skip
 
 
@@ -127,6 +129,27 @@ def _neighbourhood(args: Namespace) -> dict[str, Any]:
             )
         near["rotation"] = three_numbers(args.rotation, "--rotation", "30,0,0")
     return near
+
+
+def _position_error(text: str) -> tuple[float, float]:
+    """Return both standard deviations of --position-error, given or from a summary."""
+    if text.lower().endswith(".json"):
+        path = existing_file(Path(text))
+        try:
+            figures = json.loads(path.read_text(encoding="utf-8-sig"))
+            found = figures["uncertainty"]
+            along, across = (float(found[name]) for name in ("sd_along", "sd_across"))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{text}: no summary of `geounfold unfold --uncertainty`") from error
+    else:
+        such = f"--position-error needs two numbers of 0 or more such as 2.5,1, not '{text}'"
+        try:
+            along, across = (number(word, "--position-error") for word in text.split(","))
+        except (ValueError, OptionError) as error:
+            raise OptionError(such) from error
+        if min(along, across) < 0:
+            raise OptionError(such)
+    return along, across
 
 
 def _variogram(path: str) -> Variogram:

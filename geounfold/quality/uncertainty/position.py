@@ -68,15 +68,24 @@ class PositionUncertainty:
         sd[~placed] = np.nan
         return {"sd_along": sd[:, 0], "sd_across": sd[:, 1]}
 
+    @property
+    def mean(self) -> tuple[float, float]:
+        """Root mean square of the deviations over the blocks, along and across."""
+        along, across = np.sqrt((self.sd**2).mean(axis=0)).tolist()
+        return along, across
+
     def summary(self) -> dict[str, Any]:
         """Return the figures for the summary, in the data's unit.
 
-        ``rms`` is the expected root mean square distance from the true places, ``within_90`` the
-        distance within which 90 % of the blocks are expected.
+        ``sd_along`` and ``sd_across`` are root mean squares over the blocks.  ``rms`` is the
+        expected root mean square distance from the true places, ``within_90`` the distance within
+        which 90 % of the blocks are expected.
         """
-        along, across = (np.sqrt(np.mean(s**2)) for s in self.sd.T)
+        along, across = self.mean
         return {
             "members": self.members,
+            "sd_along": along,
+            "sd_across": across,
             "rms_along": float(np.sqrt(2) * along),
             "rms_across": float(across),
             "rms": float(np.sqrt(2 * along**2 + across**2)),

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         transfer,
     )
     from geounfold.flattening import FLATTENERS, Flattening, flatten
+    from geounfold.gain import Assessment, HolesStudy, assess, study_holes
     from geounfold.geometry.mesh import TetMesh, TriMesh
     from geounfold.io.block_sizes import block_model
     from geounfold.io.solids import fill
@@ -64,6 +65,10 @@ _HOMES = {
     "HolesBody": "modelling",
     "regular_grid": "body.block_model",
     "transfer": "estimation.transfer",
+    "Assessment": "gain",
+    "assess": "gain",
+    "HolesStudy": "gain",
+    "study_holes": "gain",
     "compare": "comparison.flatteners",
     "ControlMesh": "mapping.control_mesh",
     "CrossCheck": "comparison.crosscheck",
@@ -109,6 +114,7 @@ _HOMES = {
 
 __all__ = [
     "FLATTENERS",
+    "Assessment",
     "BlockModel",
     "ControlMesh",
     "CrossCheck",
@@ -120,6 +126,7 @@ __all__ = [
     "Flattening",
     "GeounfoldError",
     "HolesBody",
+    "HolesStudy",
     "InputError",
     "ModelFrame",
     "Neighbourhood",
@@ -134,6 +141,7 @@ __all__ = [
     "Variogram",
     "__version__",
     "aligned_rms",
+    "assess",
     "axes_from_angles",
     "block_model",
     "body_from_holes",
@@ -156,6 +164,7 @@ __all__ = [
     "report",
     "simulate",
     "simulate_faulted",
+    "study_holes",
     "transfer",
     "unfold",
     "unfold_domains",

@@ -1,211 +1,227 @@
 """Does it pay? Kriging in folded, stratigraphic, unfolded and true coordinates, against the truth.
 
-    python tests/study/study.py [--seeds 20] [--bodies NAME ...] [--spacings 25 50 100]
-                                [--jobs 2] [-o data/study.csv]
+    python tests/study/study.py [--seeds 2] [--bodies NAME ...] [--spacings 25 50 100]
+                                [--ranges 60 120 200] [--nuggets 0 0.3 0.6] [-o data/study.csv]
 
-Grades are simulated in the true flat space of a simulated body, drilled in the folded one, and
-estimated at blocks drawn from it, in arms that differ by nothing but the coordinates:
+Grades with nugget are simulated in the true flat space of a simulated body, drilled in the folded
+one, and estimated at blocks drawn from it, in arms that differ by nothing but the coordinates:
 
-  folded_isotropic  folded coordinates, one range
-  folded_best       folded coordinates, the best of nine settings: one range; one range along and
-                    one across planes that hold the fold axis and dip by -60, -30, 0, 30 or 60
-                    degrees; three ranges at -30, 0 and 30. The true fold axis is given, and which
-                    setting is best is judged by the truth: no user could do as well.
-  stratigraphic     x, y, and the true height between bottom and top times the mean thickness
-  geounfold         coordinates unfolded from the blocks, with the defaults
-  truth             the true flat coordinates: the ceiling
+  isotropic      folded coordinates, one range
+  plane          folded coordinates, one plane of anisotropy, found from the samples: of the mean
+                 plane of their places and the two along which grades are most alike, the one with
+                 the least error at left-out holes
+  plane_truth    the same planes and the layer's mean plane; the truth chooses, as no user could
+  limbs          domains of like dip of the layer, each with its own plane, none uses another's
+                 samples
+  stratigraphic  x, y, and the height in the layer times the mean thickness
+  rebuilt        unfolded from a body that is rebuilt from the holes
+  geounfold      unfolded from the blocks, with the defaults
+  truth          the true flat coordinates: the ceiling
 
-An arm of locally varying anisotropy is left out: of the kept libraries gstlearn has variograms
-whose angles vary, but no search that follows them, so neighbours would not be chosen alike.
+Errors are those of the grade without its nugget, as a block has it; `cv_rmse` is the error at the
+samples of left-out holes, nugget and all. Every arm has the same samples, the same automatic fit of
+a variogram (to the same whole holes, some 500 samples), and the 24 nearest samples in units of the
+ranges, no more than 6 of a hole. Seeds alternate between normal grades (standard deviation 0.4 of
+the mean) and lognormal ones (1 of the mean). An arm of locally varying anisotropy is left out: of
+the kept libraries gstlearn has variograms whose angles vary, but no search that follows them.
 
-Every arm has the same samples, the same automatic fit of a variogram (to the same samples, of
-whole holes, at most 700), and the same neighbourhood: the 24 nearest in the measure of the fitted
-ranges, no more than 6 of a hole. Rows that are in the output already are not computed again.
+`foretold_...` are the gains that `gu.assess` foretells from the same samples. Rows that are in the
+output already are not computed again.
 """
 
 from __future__ import annotations
 
 import argparse
-import multiprocessing as mp
-import os
 import sys
-import tempfile
 import time
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 import geounfold as gu
-from geounfold.estimation import (
-    Neighbourhood,
-    fit_variogram,
-    grade_tonnage,
-    hole_numbers,
-    krige,
-    score,
+from geounfold.estimation import hole_numbers, score
+from geounfold.gain.arms import Places, mean_normal, places_of, thickness_of
+from geounfold.gain.assessment import RIVALS, assessed
+from geounfold.gain.trial import Trial, Tried, whole_holes
+from geounfold.synthetic import GradeField, drill
+from geounfold.synthetic.faulted import simulate_faulted
+
+BODIES = {
+    "sim_case_1": ("gently flexed", "vertical"),
+    "recumbent": ("tight", "inclined"),
+    "refolded_tight": ("doubly curved", "vertical"),
+    "domino": ("faulted", "vertical"),
+}
+SPACINGS, RANGES, NUGGETS = (25, 50, 100), (60, 120, 200), (0.0, 0.3, 0.6)
+ARMS = (
+    *("isotropic", "plane", "plane_truth", "limbs", "stratigraphic", "rebuilt", "geounfold"),
+    "truth",
 )
-from geounfold.synthetic import PATTERNS, GradeField, drill
+KEY = ["body", "spacing", "range", "nugget", "seed"]
 
-BODIES = ("sim_case_2", "plunging", "steep", "recumbent", "box", "swelling")
-SPACINGS = (25, 50, 100)
-FIELDS = ("rough", "smooth")
-ARMS = ("folded_isotropic", "folded_best", "stratigraphic", "geounfold", "truth")
-KEY = ["body", "spacing", "seed"]
-
-RANGES = (200.0, 200.0, 25.0)
+THINNER = 8  # range along the layer over that across it
 COMPOSITE = 4.0
-TARGETS, CHECKED, FITTED = 600, 300, 700  # blocks; samples of cross-validation and of the fit
-NEAREST, PER_HOLE = 24, 6
-CUTOFFS = (0.5, 0.75, 0.9)  # quantiles of the true grades
-TILTS = (-60.0, -30.0, 0.0, 30.0, 60.0)
-LIFE = 4  # runs of a process: gstlearn keeps memory of what it solves
+TARGETS, CHECKED, FITTED = 300, 200, 500  # blocks; samples of cross-validation and of the fit
 
 
-def field_of(name: str, seed: int) -> GradeField:
-    """Return a field: rough ones are spherical or exponential, lognormal or not, layered or not."""
-    if name == "smooth":
-        return GradeField("gaussian", RANGES, seed=1000 + seed, mean=1.0, deviation=0.4)
-    return GradeField(
-        ("spherical", "exponential")[seed % 2],
-        RANGES,
-        seed=seed,
-        mean=1.0,
-        deviation=0.4,
-        lognormal=seed // 2 % 2 == 1,
-        layers=(0.0, 0.4, 0.1, 0.3) if seed % 5 == 4 else (),
-    )
+@dataclass(frozen=True)
+class Grades:
+    """Grades at places of the true flat space: a field and nugget."""
+
+    reach: float
+    nugget: float
+    seed: int
+
+    @property
+    def lognormal(self) -> bool:
+        return self.seed % 2 == 1
+
+    @cached_property
+    def field(self) -> GradeField:
+        kind = ("spherical", "exponential")[self.seed // 2 % 2]
+        reach = (self.reach, self.reach, self.reach / THINNER)
+        return GradeField(kind, reach, seed=self.seed + round(7 * self.reach))
+
+    def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the grades of samples, and those of blocks, without nugget."""
+        share = 1 - self.nugget
+        z = np.sqrt(share) * self.field.standard(places)
+        e = np.sqrt(self.nugget) * np.random.default_rng(self.seed).normal(size=len(z))
+        if not self.lognormal:
+            return 1 + 0.4 * (z + e), 1 + 0.4 * z
+        s = np.sqrt(np.log(2.0))  # a standard deviation of 1 of the mean
+        return np.exp(s * (z + e) - s**2 / 2), np.exp(s * z - share * s**2 / 2)
 
 
-def some_holes(holes: np.ndarray, most: int, seed: int) -> np.ndarray:
-    """Return rows of whole holes, drawn until there would be more than so many."""
-    order = np.random.default_rng(seed).permutation(np.unique(holes))
-    count = np.cumsum(np.bincount(holes)[order])
-    chosen = order[: max(2, int(np.searchsorted(count, most, side="right")))]
-    return np.flatnonzero(np.isin(holes, chosen))
+@dataclass(frozen=True, eq=False)
+class Drilled:
+    """One body and its holes: places of samples and targets in all coordinates."""
+
+    name: str
+    spacing: int
+    holes: np.ndarray
+    own: Places
+    targets: Places
+    true: np.ndarray  # of samples
+    true_targets: np.ndarray
+    rebuilt: tuple[np.ndarray, np.ndarray] | None
 
 
-def neighbourhood(model, points) -> Neighbourhood:
-    """Return the search: everything within reach, the nearest in units of the ranges first."""
-    ranges = np.array(model.ranges) if model.structures else np.ones(3)
-    extent = np.linalg.norm(np.ptp(points, axis=0))
-    radii = 2 * extent * ranges / ranges.min()
-    return Neighbourhood(
-        radii=tuple(radii),
-        rotation=model.rotation,
-        min_samples=1,
-        max_samples=NEAREST,
-        max_per_hole=PER_HOLE,
-    )
+def drilled(name: str, spacing: int) -> Drilled:
+    """Return a body's samples and targets."""
+    if name == "domino":
+        return _faulted(name, spacing)
+    body = gu.simulate(name)
+    field = GradeField("spherical", (100.0, 100.0, 10.0), seed=0)
+    how = {"pattern": BODIES[name][1], "seed": spacing, "interval": COMPOSITE / 2}
+    samples = gu.read_drillholes(*drill(body, field, spacing, **how)).samples(COMPOSITE)
+    folded = samples[["x", "y", "z"]].to_numpy()
+    true, there = body.sheet.unfold(folded)
+    holes = samples["hole"].to_numpy()
+    rows = np.random.default_rng(spacing).choice(len(body.folded), TARGETS, replace=False)
+    u = gu.unfold(body.folded)
+    rebuilt = None
+    try:
+        made = gu.body_from_holes(*drill(body, field, spacing, waste=True, **how), code="ORE")
+        again = gu.unfold(made.points).map
+        rebuilt = again.to_flat(folded), again.to_flat(body.folded[rows])
+    except gu.GeounfoldError as error:
+        sys.stdout.write(f"{name} {spacing}: not rebuilt: {error}\n")
+    return _placed(name, spacing, u, (folded, true, there, holes), (body, rows), rebuilt)
 
 
-def settings(spec) -> list[dict]:
-    """Return the nine settings of the folded space: how the variogram is fitted."""
-    turned = [(spec.azimuth, spec.plunge, spec.tilt + t) for t in TILTS]
-    return [
-        {"anisotropy": "isotropic"},
-        *({"anisotropy": "transverse", "rotation": r} for r in turned),
-        *({"anisotropy": "orthotropic", "rotation": r} for r in turned[1:4]),
-    ]
+def _faulted(name: str, spacing: int) -> Drilled:
+    """Return the same of a faulted body, whose samples are blocks in columns."""
+    body = simulate_faulted(name)
+    X, step = body.folded, spacing / body.step
+    column = (X[:, :2] - X[:, :2].min(axis=0)) / body.step
+    number = np.floor(column / step + 1e-9)
+    middle = np.floor((number + 0.5) * step)
+    own = (np.abs(column - middle) < 0.51).all(axis=1)
+    holes = np.array([f"{a:.0f}-{b:.0f}" for a, b in middle[own]], dtype=object)
+    rest = np.flatnonzero(~own)
+    rows = np.random.default_rng(spacing).choice(rest, min(TARGETS, len(rest)), replace=False)
+    u = gu.unfold(X, faults=body.surfaces)
+    there = np.ones(int(own.sum()), dtype=bool)
+    return _placed(name, spacing, u, (X[own], body.truth[own], there, holes), (body, rows), None)
 
 
-def estimated(points, values, holes, targets, fitted_rows, how) -> tuple:
-    """Return estimates at targets, the model and the neighbourhood of one arm."""
-    model = fit_variogram(points[fitted_rows], values[fitted_rows], **how).model
-    near = neighbourhood(model, points)
-    found = krige(points, values, targets, model, near, holes=holes)
-    return found.estimate, model, near
+def _placed(name, spacing, u, samples, targets, rebuilt) -> Drilled:
+    """Return the places of samples and targets that the map reaches."""
+    folded, true, there, holes = samples
+    body, rows = targets
+    own, reached = places_of(u.map, folded[there])
+    kept = np.flatnonzero(there)[reached]
+    far, met = places_of(u.map, body.folded[rows])
+    if rebuilt is not None:
+        rebuilt = rebuilt[0][kept], rebuilt[1][met]
+    return Drilled(
+        name, spacing, hole_numbers(holes[kept]), own, far, true[kept], body.truth[rows][met],
+        rebuilt,
+    )  # fmt: skip
 
 
-def figures(truth, found, points, values, holes, model, near, checked) -> dict:
-    """Return one arm's row of figures."""
-    at_blocks = score(truth, found)
-    rows = np.flatnonzero(np.isin(holes, holes[checked]))
-    back = krige(
-        points, values, points[rows], model, near, holes=holes, leave_out=holes[rows]
-    ).estimate
-    left_out = score(values[rows], back)
-    cutoffs = np.quantile(truth, CUTOFFS)
-    true, got = grade_tonnage(truth, cutoffs), grade_tonnage(found, cutoffs)
-    row = {
-        "rmse": at_blocks.rmse,
-        "bias": at_blocks.bias,
-        "slope": at_blocks.slope,
-        "correlation": at_blocks.correlation,
-        "missing": at_blocks.missing,
-        "cv_rmse": left_out.rmse,
-        "cv_bias": left_out.bias,
-        "cv_slope": left_out.slope,
-        "cv_correlation": left_out.correlation,
-        "range_along": model.ranges[0],
-        "range_across": model.ranges[2],
-        "nugget": model.nugget / model.sill,
+def arms_of(drawn: Drilled, trial: Trial, block: np.ndarray) -> dict[str, Tried]:
+    """Return the estimates of every arm."""
+    own, far = drawn.own, drawn.targets
+    planes = trial.planes(own, far, drawn.spacing)
+    every = [*planes, trial.turned(own, far, mean_normal(own.normal))]
+    thickness, level = thickness_of(own), {"anisotropy": "transverse"}
+    out = {
+        "isotropic": trial.run(own.folded, far.folded, anisotropy="isotropic"),
+        "plane": min(planes, key=trial.error),
+        "plane_truth": min(every, key=lambda tried: score(block, tried.found).rmse),
+        "limbs": trial.limbs(own, far),
+        "stratigraphic": trial.run(
+            own.stratigraphic(thickness), far.stratigraphic(thickness), **level
+        ),
+        "geounfold": trial.run(own.flat, far.flat, **level),
+        "truth": trial.run(drawn.true, drawn.true_targets, **level),
     }
-    for q, a, b in zip(CUTOFFS, true.itertuples(), got.itertuples(), strict=True):
-        row[f"tonnage_{q:g}"] = b.tonnage - a.tonnage
-        row[f"metal_{q:g}"] = b.metal / a.metal - 1
-    return row
+    if drawn.rebuilt is not None:
+        out["rebuilt"] = trial.run(*drawn.rebuilt, **level)
+    return out
 
 
-def run(task: tuple) -> list[dict]:
-    """Return the rows of one body, spacing and seed: both fields, every arm."""
-    name, spacing, seed, path = task
-    body, mapping = gu.simulate(name), gu.load(path)
-    spec = body.sheet.spec
-    pattern = PATTERNS[seed % len(PATTERNS)]
-    drawn = np.random.default_rng(seed).choice(len(body.folded), TARGETS, replace=False)
+def run(drawn: Drilled, reach: float, nugget: float, seed: int) -> list[dict]:
+    """Return the rows of one cell, one for each arm."""
+    grades = Grades(reach, nugget, seed)
+    values, _ = grades.at(drawn.true)
+    _, block = grades.at(drawn.true_targets)
+    trial = Trial(
+        values, drawn.holes, whole_holes(drawn.holes, FITTED, seed),
+        whole_holes(drawn.holes, CHECKED, seed + 1),
+    )  # fmt: skip
+    found = arms_of(drawn, trial, block)
+    told = assessed(drawn.own, drawn.holes, values, drawn.targets, found["geounfold"].model, None)
+    cell = {
+        **dict(zip(KEY, (drawn.name, drawn.spacing, reach, nugget, seed), strict=True)),
+        "lognormal": grades.lognormal,
+        "holes": int(drawn.holes.max()) + 1,
+        "samples": len(values),
+        "turn_in_range": told.turn_in_range,
+        "turn_in_spacing": told.turn_in_spacing,
+        "off_plane": told.off_plane,
+        **{f"foretold_{name}": told.gains.loc[name, "gain"] for name in RIVALS},
+    }
     rows = []
-    for field_name in FIELDS:
-        field = field_of(field_name, seed)
-        tables = drill(body, field, spacing, pattern=pattern, seed=seed, interval=COMPOSITE / 2)
-        samples = gu.read_drillholes(*tables).samples(COMPOSITE)
-        folded = samples[["x", "y", "z"]].to_numpy()
-        true, there = body.sheet.unfold(folded)
-        flat = mapping.to_flat(folded)
-        kept = there & np.isfinite(flat).all(axis=1)
-        folded, true, flat = folded[kept], true[kept], flat[kept]
-        values = samples["grade"].to_numpy()[kept]
-        holes = hole_numbers(samples["hole"].to_numpy()[kept])
-        low, high = body.sheet.heights(true[:, 0], true[:, 1])
-        thick = float((body.top - body.bottom).mean())
-        level = thick * (true[:, 2] - low) / (high - low)
-        truth = field.at(body.truth[drawn], body.stratigraphic[drawn])
-        places = {
-            "stratigraphic": (
-                np.column_stack([folded[:, :2], level]),
-                np.column_stack([body.folded[drawn, :2], thick * body.stratigraphic[drawn]]),
-            ),
-            "geounfold": (flat, mapping.to_flat(body.folded[drawn])),
-            "truth": (true, body.truth[drawn]),
-        }
-        fitted = some_holes(holes, FITTED, seed)
-        checked = some_holes(holes, CHECKED, seed + 1)
-        arms = {}
-        tries = [
-            estimated(folded, values, holes, body.folded[drawn], fitted, how)
-            for how in settings(spec)
-        ]
-        best = min(tries, key=lambda found: score(truth, found[0]).rmse)
-        arms["folded_isotropic"] = (folded, *tries[0])
-        arms["folded_best"] = (folded, *best)
-        for arm, (points, targets) in places.items():
-            arms[arm] = (points, *estimated(points, values, holes, targets, fitted, {}))
-        for arm in ARMS:
-            points, found, model, near = arms[arm]
-            rows.append(
-                {
-                    **dict(zip(KEY, (name, spacing, seed), strict=True)),
-                    "field": field_name,
-                    "kind": field.kind,
-                    "lognormal": field.lognormal,
-                    "layered": bool(field.layers),
-                    "pattern": pattern,
-                    "holes": len(np.unique(holes)),
-                    "samples": len(values),
-                    "arm": arm,
-                    **figures(truth, found, points, values, holes, model, near, checked),
-                }
-            )
+    there = np.isfinite(np.column_stack([tried.found for tried in found.values()])).all(axis=1)
+    for arm in ARMS:
+        if arm not in found:
+            continue
+        tried, model = found[arm], found[arm].model
+        got = score(block[there], tried.found[there])
+        rows.append(
+            {
+                **cell, "arm": arm, "rmse": got.rmse, "bias": got.bias, "slope": got.slope,
+                "correlation": got.correlation, "missing": int((~there).sum()),
+                "cv_rmse": trial.error(tried), "range_along": model.ranges[0],
+                "range_across": model.ranges[2], "fitted_nugget": model.nugget / model.sill,
+            }
+        )  # fmt: skip
     return rows
 
 
@@ -220,9 +236,7 @@ def rounded(rows: list[dict]) -> pd.DataFrame:
 def write(path: Path, table: pd.DataFrame) -> None:
     """Write the table whole, sorted."""
     order = {arm: k for k, arm in enumerate(ARMS)}
-    table = table.sort_values(
-        [*KEY, "field", "arm"], key=lambda c: c.map(order) if c.name == "arm" else c
-    )
+    table = table.sort_values([*KEY, "arm"], key=lambda c: c.map(order) if c.name == "arm" else c)
     part = path.with_suffix(".part")
     table.to_csv(part, index=False, lineterminator="\n")
     part.replace(path)
@@ -231,35 +245,30 @@ def write(path: Path, table: pd.DataFrame) -> None:
 def main(argv=None) -> int:
     """Compute the rows that are not in the output."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--bodies", nargs="+", default=list(BODIES))
     parser.add_argument("--spacings", type=int, nargs="+", default=list(SPACINGS))
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--ranges", type=float, nargs="+", default=list(RANGES))
+    parser.add_argument("--nuggets", type=float, nargs="+", default=list(NUGGETS))
     parser.add_argument("-o", "--output", type=Path, default=Path("data/study.csv"))
     args = parser.parse_args(argv)
     table = pd.read_csv(args.output) if args.output.exists() else pd.DataFrame()
     done = set(zip(*(table[k] for k in KEY), strict=True)) if len(table) else set()
     tasks = [
-        (b, d, s) for s in range(args.seeds) for b in args.bodies for d in args.spacings
-        if (b, d, s) not in done
+        (b, d, r, n, s) for s in range(args.seeds) for b in args.bodies for d in args.spacings
+        for r in args.ranges for n in args.nuggets if (b, d, r, n, s) not in done
     ]  # fmt: skip
     sys.stdout.write(f"{len(tasks)} runs to do, {len(done)} done\n")
-    if not tasks:
-        return 0
-    start = time.perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        maps = {name: str(Path(folder) / f"{name}.npz") for name in args.bodies}
-        for name, path in maps.items():
-            gu.unfold(gu.simulate(name).folded).save(path)
-        with mp.get_context("spawn").Pool(args.jobs, maxtasksperchild=LIFE) as pool:
-            jobs = [(*task, maps[task[0]]) for task in tasks]
-            for number, rows in enumerate(pool.imap_unordered(run, jobs), 1):
-                table = pd.concat([table, rounded(rows)], ignore_index=True)
-                if number % 10 == 0 or number == len(jobs):
-                    write(args.output, table)
-                    seconds = time.perf_counter() - start
-                    sys.stdout.write(f"{number} of {len(jobs)} in {seconds:.0f} s\n")
-                    sys.stdout.flush()
+    start, places = time.process_time(), {}
+    for number, (name, spacing, *cell) in enumerate(tasks, 1):
+        if (name, spacing) not in places:
+            places[name, spacing] = drilled(name, spacing)
+        table = pd.concat([table, rounded(run(places[name, spacing], *cell))], ignore_index=True)
+        if number % 9 == 0 or number == len(tasks):
+            write(args.output, table)
+            seconds = time.process_time() - start
+            sys.stdout.write(f"{number} of {len(tasks)} in {seconds:.0f} s\n")
+            sys.stdout.flush()
     return 0
 
 

@@ -10,6 +10,7 @@ from geounfold import _version
 from geounfold.cli.arguments.blocks import add_fill, add_grid, add_transfer
 from geounfold.cli.arguments.compare import add_compare, add_crosscheck, add_quality
 from geounfold.cli.arguments.estimate import add_estimate
+from geounfold.cli.arguments.gain import add_assess, add_study_holes
 from geounfold.cli.arguments.groups import add_common
 from geounfold.cli.arguments.help import Parser
 from geounfold.cli.arguments.map import add_map
@@ -75,6 +76,7 @@ def build_parser(*, holes: bool = False) -> Parser:
     commands = parser.commands()
     for add in (
         *(add_unfold, partial(add_map, holes=holes), add_estimate, add_body_from_holes),
+        *(add_assess, add_study_holes),
         *(add_compare, add_crosscheck, add_quality, add_simulate, add_view),
         *(add_fill, add_grid, add_transfer, add_init, add_doctor, add_completion),
     ):

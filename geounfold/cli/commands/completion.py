@@ -17,6 +17,8 @@ _FILES = frozenset(
         *("source", "target", "variogram", "differences", "faults_out"),
         *("collar", "survey", "intervals", "assays", "polygon", "top_out", "bottom_out"),
         "intercepts_out",
+        "body",
+        "table",
     }
 )
 

@@ -55,7 +55,7 @@ def estimation(
 
     stage("estimating")
     return estimate(
-        saved, _table(samples, args), blocks, variogram,
+        saved, sample_table(samples, args), blocks, variogram,
         grade=args.grade, method=args.method, neighbourhood=near,
         mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
         soft_boundary=soft, all_blocks=args.all_blocks, position_error=off,
@@ -77,7 +77,7 @@ def summarised(args: Namespace, result: Estimation, stage: Callable[[str], None]
     return out
 
 
-def _table(samples: PointTable, args: Namespace) -> pd.DataFrame:
+def sample_table(samples: PointTable, args: Namespace) -> pd.DataFrame:
     """Return the samples' coordinates, grade and holes as one table."""
     if args.grade in (*samples.columns, *"xyz", "hole"):
         raise OptionError(f"--grade {args.grade} names a coordinate or the holes")

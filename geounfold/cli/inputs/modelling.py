@@ -31,7 +31,7 @@ def body_options(args: Namespace) -> BodyOptions:
     from geounfold.modelling import BodyOptions
 
     if (args.code is None) == (args.cut_off is None):
-        raise OptionError("body-from-holes needs --code A,B or --cut-off GRADE=VALUE, one of them")
+        raise OptionError(f"{args.command} needs --code A,B or --cut-off GRADE=VALUE, one of them")
     given: dict[str, Any] = {}
     if args.code is not None:
         words = next(csv.reader([args.code], skipinitialspace=True), [])
@@ -39,15 +39,15 @@ def body_options(args: Namespace) -> BodyOptions:
         if not given["code"]:
             raise OptionError(f"--code needs codes such as ORE1,ORE2, not '{args.code}'")
     for name in ("max_waste", "least_length", "extent", "least_thickness"):
-        if getattr(args, name) is not None:
+        if getattr(args, name, None) is not None:
             given[name] = number(getattr(args, name), _flag(name))
     if args.cut_off is not None:
         given["cut_off"] = _cut_off(args.cut_off)
-    if args.axis is not None:
+    if getattr(args, "axis", None) is not None:
         given["axis"] = _axis(args.axis)
-    if args.polygon is not None:
+    if getattr(args, "polygon", None) is not None:
         given["polygon"] = _polygon(args.polygon)
-    if args.shape is not None:
+    if getattr(args, "shape", None) is not None:
         given["shape"] = args.shape
     if args.code_column is not None:
         given["code_column"] = args.code_column

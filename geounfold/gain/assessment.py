@@ -38,7 +38,7 @@ RIVALS = ("isotropic", "plane", "limbs", "stratigraphic")
 
 _TARGETS = 160  # points of the body at which errors are foretold
 _MOST_DRAWS = 40  # rounds of points drawn in the body's box
-_ALONG = (1.0, 0.6, 0.35)  # ranges tried along a plane, over that along the layer
+_ALONG = (1.0, 0.5)  # ranges tried along a plane, over that along the layer
 _ACROSS = (1.0, 2.0, 4.0)  # and across it, over that across the layer
 _ROUND = 5  # ranges tried without a plane
 _APART = 1e3  # extents between limbs, so that no sample of one estimates another
@@ -150,7 +150,7 @@ def assess(
     grade, hole : str
         Columns; the hole's is found by name.
     variogram : Variogram, optional
-        In the unfolded space; fitted to the samples by default.
+        In the unfolded space; a nugget and one structure are fitted by default.
     values : GradeRules or mapping, optional
         How the grade's values are read.
 
@@ -171,7 +171,11 @@ def assess(
     holes = hole_numbers(flat.holes)
     if holes.max() < 2:
         raise InputError(f"assess needs samples of three holes or more, not {holes.max() + 1}")
-    model = fit_variogram(flat.points, flat.grades).model if variogram is None else variogram
+    model = variogram
+    if model is None:
+        model = fit_variogram(
+            flat.points, flat.grades, holes=holes, anisotropy="transverse", structures=1
+        ).model
     own, there = places_of(carrier, flat.folded)
     holes, grades = holes[there], flat.grades[there]
     targets = places_of(carrier, points_in_body(carrier, flat.folded))[0]

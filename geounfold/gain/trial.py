@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from geounfold.estimation import Neighbourhood, Variogram, fit_variogram, krige
+from geounfold.estimation import (
+    FittedVariogram,
+    Neighbourhood,
+    Variogram,
+    fit_variogram,
+    krige,
+)
 from geounfold.gain.arms import (
     Places,
     best_planes,
@@ -37,11 +43,14 @@ class Tried:
         At the samples that are checked, from the other holes only.
     model : Variogram
         As fitted; of limbs, that of the largest.
+    value : float
+        The fit's `FittedVariogram.value`: the smaller, the likelier are the samples.
     """
 
     found: Floats
     back: Floats
     model: Variogram
+    value: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +67,15 @@ class Trial:
         Rows to which variograms are fitted.
     checked : (c,) int
         Rows that are estimated from the other holes.
+    kinds : tuple of str
+        Structures that the fit tries.
     """
 
     values: Floats
     holes: Ints
     fitted: Ints
     checked: Ints
+    kinds: tuple[str, ...] = ("spherical", "exponential")
 
     def error(self, tried: Tried) -> float:
         """Return the root mean square error at the checked samples."""
@@ -82,18 +94,25 @@ class Trial:
         """
         good = np.asarray(np.isfinite(points).all(axis=1))
         rows = self.fitted[good[self.fitted]]
-        model = fit_variogram(points[rows], self.values[rows], **how).model
+        fitted = self._fit(points, rows, **how)
         own = np.flatnonzero(good)
-        found, back = self._kriged(points, own, targets, self.checked, model)
-        return Tried(found, back, model)
+        found, back = self._kriged(points, own, targets, self.checked, fitted.model)
+        return Tried(found, back, fitted.model, fitted.value)
+
+    def _fit(self, points: Floats, rows: Ints, **how: Any) -> FittedVariogram:
+        """Return the variogram of some rows: nugget and one structure."""
+        return fit_variogram(
+            points[rows], self.values[rows],
+            holes=self.holes[rows], structures=1, kinds=self.kinds, **how,
+        )  # fmt: skip
 
     def plane(self, own: Places, targets: Places, spacing: float) -> Tried:
         """Return the estimates with one plane of anisotropy, which the samples choose.
 
         Of the mean plane of their places and the two along which grades are most alike, the one
-        with the least error at left-out holes.
+        of the likeliest variogram.
         """
-        return min(self.planes(own, targets, spacing), key=self.error)
+        return min(self.planes(own, targets, spacing), key=lambda tried: tried.value)
 
     def planes(self, own: Places, targets: Places, spacing: float) -> list[Tried]:
         """Return the estimates with each plane that is tried."""
@@ -121,9 +140,8 @@ class Trial:
             rows = self.fitted[of[self.fitted] == k]
             if model is None or len(rows) >= _FEWEST:
                 rows = rows if len(rows) >= _LEAST else mine
-                model = fit_variogram(
-                    own.folded[rows], self.values[rows], anisotropy="transverse", rotation=rotation
-                ).model
+                how: dict[str, Any] = {"anisotropy": "transverse", "rotation": rotation}
+                model = self._fit(own.folded, rows, **how).model
             first = model if first is None else first
             some, check = at == k, checked == k
             found[some], back[check] = self._kriged(

@@ -1,6 +1,7 @@
 """Bodies rebuilt from their holes: errors of volume, horizons and layers by spacing.
 
-    python tests/study/from_holes.py [--spacings 25 50 100] [-o data/from_holes.csv]
+    python tests/study/from_holes.py [--bodies NAME ...] [--spacings 25 50 100]
+                                     [-o data/from_holes.csv]
 
 Each simulated body is drilled, its intervals are coded ORE and WASTE, and `body_from_holes`
 rebuilds it with blocks of 10 m. Rows that are in the output already are not computed again.
@@ -119,13 +120,14 @@ def main(argv=None) -> int:
     """Compute the rows that are not in the output."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--spacings", type=int, nargs="+", default=list(SPACINGS))
+    parser.add_argument("--bodies", nargs="+", default=[name for name, _ in BODIES])
     parser.add_argument("-o", "--output", type=Path, default=Path("data/from_holes.csv"))
     args = parser.parse_args(argv)
     table = pd.read_csv(args.output) if args.output.exists() else pd.DataFrame()
     for name, pattern in BODIES:
         done = table[table["body"] == name] if len(table) else table
         left = [s for s in args.spacings if not len(done) or s not in set(done["spacing"])]
-        if not left:
+        if not left or name not in args.bodies:
             continue
         body = gu.simulate(name)
         known = layer_error(body, body.folded)

@@ -16,19 +16,20 @@ from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, TABLES, WHERE, 
 _BODY = "a map .npz, block centroids, or a closed surface; the latter two are unfolded first"
 
 _ASSESS = """\
-The variogram of the samples in the unfolded space is taken as true. The error of
-kriging in folded coordinates (one range; one best plane; a plane for each limb), in
-stratigraphic ones and in the unfolded space then follows from the samples' places
-alone. The gain is 1 less the unfolded error over the other. Between the two bounds
-lie nine of ten runs of the study (docs/study.md).
+The variogram of the samples in the unfolded space is taken as true. The error
+of kriging in folded coordinates (one range; one best plane; a plane for each limb),
+in stratigraphic ones and in the unfolded space then follows from the samples'
+places alone. The gain is 1 less the unfolded error over the other. Between the
+two bounds lie nine of ten runs of the study (docs/study.md).
 
 Needs: pip install 'geounfold[geostat]'"""
 
 _STUDY = """\
-Each sample is estimated without its own hole, in folded, stratigraphic and unfolded
-coordinates, with the same samples, automatic variogram and search. The page has the
-errors, the gain of unfolding with its interval over holes drawn with replacement,
-and the gain that was to be expected. Nothing leaves the machine.
+Each sample is estimated without its own hole, in folded, stratigraphic and
+unfolded coordinates, with the same samples, automatic variogram and search. The
+page has the errors, the gain of unfolding with its interval over holes drawn
+with replacement, and the gain that was to be expected. Nothing leaves the
+machine.
 
 Needs: pip install 'geounfold[geostat]'"""
 
@@ -67,15 +68,15 @@ def add_study_holes(commands: Any) -> Parser:
         "compare unfolding with other ways on holes left out",
         details=joined(_STUDY, WHERE, POINT_FORMATS),
         examples=(
-            "geounfold study-holes collar.csv survey.csv assay.csv --body m.npz --grade CU \\\n"
-            "    -o study.html",
+            "geounfold study-holes collar.csv survey.csv assay.csv --body m.npz \\\n"
+            "    --grade CU -o study.html",
             "geounfold study-holes collar.csv survey.csv assay.csv --cut-off CU=0.2 \\\n"
             "    --grade CU,NI --composite 2 -o study.html --table study.csv",
         ),
     )
     group = parser.section("holes")
     add_hole_tables(group, "assays", "ASSAYS", "grades of intervals")
-    group.add("--grade", metavar="A,B", required=True, help="columns of ASSAYS to compare")
+    group.add("--grade", metavar="A,B", help="columns of ASSAYS to compare, needed")
     group.add("--composite", metavar="LENGTH", help="length of composites along a hole")
     group.add("--where", metavar="EXPR", help="rows of ASSAYS to take")
     add_grade_values(group)
@@ -87,7 +88,7 @@ def add_study_holes(commands: Any) -> Parser:
     group.add("--max-waste", metavar="L", help="longest waste inside an intercept (default 0)")
     group.add("--block-size", metavar="X,Y,Z", help="sides of blocks")
     group = parser.section("outputs")
-    group.add("-o", "--output", metavar="PAGE.html", required=True, help="the page")
+    group.add("-o", "--output", metavar="PAGE", required=True, help="the page, .html")
     group.add("--table", metavar="T", help=f"its table: {TABLES}")
     group.add("--summary", metavar="S.json", help="the same figures and more")
     return parser

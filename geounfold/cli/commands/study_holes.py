@@ -28,9 +28,10 @@ def run(args: Namespace, console: Console) -> None:
     chosen = [name for name in ("body", "code", "cut_off") if getattr(args, name) is not None]
     if len(chosen) != 1:
         raise OptionError("study-holes needs --body, --code or --cut-off, one of them")
-    grades = [w.strip() for w in next(csv.reader([args.grade]), []) if w.strip()]
+    given = args.grade or ""
+    grades = [word.strip() for word in next(csv.reader([given]), []) if word.strip()]
     if not grades:
-        raise OptionError(f"--grade needs columns such as CU,NI, not '{args.grade}'")
+        raise OptionError(f"--grade needs columns such as CU,NI, not '{given}'")
     outputs = Outputs.planned(
         {
             "--output": (args.output, HTML),

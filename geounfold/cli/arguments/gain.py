@@ -17,7 +17,7 @@ _BODY = "a map .npz, block centroids, or a closed surface; the latter two are un
 
 _ASSESS = """\
 The variogram of the samples in the unfolded space is taken as true. The error
-of kriging in folded coordinates (one range; one best plane; a plane for each limb),
+of kriging in folded coordinates (one range; one plane; a plane for each limb),
 in stratigraphic ones and in the unfolded space then follows from the samples'
 places alone. The gain is 1 less the unfolded error over the other. Between the
 two bounds lie nine of ten runs of the study (docs/study.md).

@@ -9,10 +9,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from geounfold.backends.igl import SurfaceIndex, barycentric_in_triangles
+from geounfold.backends.threads import over_slices
 from geounfold.geometry.measures import unit
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.methods.sheet.mid_surface.normal_equations import Stencils
 from geounfold.methods.sheet.mid_surface.spline import Jet, SplineGrid
+
+SLICE = 1 << 14
+"""Points whose feet are found at once, by one core."""
 
 
 class Foot(NamedTuple):
@@ -27,6 +31,11 @@ class Foot(NamedTuple):
     t: Floats
     normal: Floats
     miss: Floats
+
+    @classmethod
+    def empty(cls, count: int) -> Foot:
+        """Return feet of ``count`` points that are still to be set."""
+        return cls(*(np.empty((count, *last)) for last in ((2,), (), (3,), ())))
 
 
 def normals(jet: Jet) -> Floats:
@@ -109,6 +118,14 @@ class MidSurface:
         """Return P and its derivatives at U (n, 2)."""
         return self.grid.jet(self.C, U)
 
+    def set_feet(self, foot: Foot, rows: slice, Q: Floats, U: Floats) -> None:
+        """Set some rows of feet to those of points Q (k, 3) at parameters U (k, 2)."""
+        P, Pu, Pv = self.grid.gradient(self.C, U)
+        normal = unit(np.cross(Pu, Pv))
+        t = np.einsum("ij,ij->i", Q - P, normal)
+        foot.U[rows], foot.t[rows], foot.normal[rows] = U, t, normal
+        foot.miss[rows] = np.linalg.norm(Q - P - t[:, None] * normal, axis=1)
+
     def search(self, near: Floats | None = None, reach: float = np.inf) -> FootSearch:
         """Return a search for feet on the part of the sheet within ``reach`` of parameters."""
         U, F = self.samples()
@@ -133,17 +150,19 @@ class FootSearch:
     def feet(self, Q: Floats, newton: int = 2) -> Foot:
         """Return the feet of points Q (n, 3): nearest sample triangle, then Newton steps."""
         _, face, closest = self.index.closest(Q)
-        corners = self.F[face]
-        weights = barycentric_in_triangles(closest, self.index.V, corners)
-        weights = np.where(np.isfinite(weights), weights, 1 / 3)  # triangles without area
-        U = np.einsum("ij,ijk->ik", weights, self.U[corners])
-        for _ in range(newton):
-            U = U + newton_step(self.sheet, Q, self.sheet.jet(U))
-        P, Pu, Pv = self.sheet.grid.gradient(self.sheet.C, U)
-        normal = unit(np.cross(Pu, Pv))
-        t = np.einsum("ij,ij->i", Q - P, normal)
-        miss = np.linalg.norm(Q - P - t[:, None] * normal, axis=1)
-        return Foot(U, t, normal, miss)
+        out = Foot.empty(len(Q))
+
+        def work(rows: slice) -> None:
+            corners = self.F[face[rows]]
+            weights = barycentric_in_triangles(closest[rows], self.index.V, corners)
+            weights = np.where(np.isfinite(weights), weights, 1 / 3)  # triangles without area
+            U = np.einsum("ij,ijk->ik", weights, self.U[corners])
+            for _ in range(newton):
+                U = U + newton_step(self.sheet, Q[rows], self.sheet.jet(U))
+            self.sheet.set_feet(out, rows, Q[rows], U)
+
+        over_slices(work, len(Q), SLICE)
+        return out
 
 
 def newton_step(sheet: MidSurface, Q: Floats, jet: Jet) -> Floats:

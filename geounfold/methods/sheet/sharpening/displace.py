@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from geounfold.geometry.measures import unit
+from geounfold.backends.threads import over_slices
 from geounfold.geometry.mesh import Floats
-from geounfold.methods.sheet.mid_surface.surface import Foot, MidSurface, newton_step, normals
+from geounfold.methods.sheet.mid_surface.surface import (
+    SLICE,
+    Foot,
+    MidSurface,
+    newton_step,
+    normals,
+)
 
 
 def node_normals(sheet: MidSurface) -> Floats:
@@ -38,9 +44,13 @@ def follow_feet(sheet: MidSurface, Q: Floats, U: Floats, steps: int) -> Foot:
 
     Feet stay within the sheet's rectangle; a point without a foot there keeps a large miss.
     """
-    for _ in range(steps):
-        U = np.clip(U + newton_step(sheet, Q, sheet.jet(U)), sheet.low, sheet.high)
-    P, Pu, Pv = sheet.grid.gradient(sheet.C, U)
-    normal = unit(np.cross(Pu, Pv))
-    t = np.einsum("ij,ij->i", Q - P, normal)
-    return Foot(U, t, normal, np.linalg.norm(Q - P - t[:, None] * normal, axis=1))
+    foot = Foot.empty(len(Q))
+
+    def work(rows: slice) -> None:
+        at = U[rows]
+        for _ in range(steps):
+            at = np.clip(at + newton_step(sheet, Q[rows], sheet.jet(at)), sheet.low, sheet.high)
+        sheet.set_feet(foot, rows, Q[rows], at)
+
+    over_slices(work, len(Q), SLICE)
+    return foot

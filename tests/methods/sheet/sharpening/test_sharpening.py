@@ -8,10 +8,10 @@ import pytest
 import geounfold as gu
 from geounfold.methods.sheet import attempts
 from geounfold.methods.sheet.attempts import HOLDS
-from geounfold.methods.sheet.mid_surface import parallel_surface
+from geounfold.methods.sheet.mid_surface import parallel_surface, surface
 from geounfold.methods.sheet.mid_surface.spline import SplineGrid
 from geounfold.methods.sheet.mid_surface.surface import MidSurface
-from geounfold.methods.sheet.sharpening import by_layers
+from geounfold.methods.sheet.sharpening import by_layers, lattice_sites
 from geounfold.methods.sheet.sharpening.by_lattice_sites import sharpen
 from geounfold.methods.sheet.sharpening.by_layers import layer_heights, sharpen_layers
 from geounfold.methods.sheet.sharpening.displace import displacement_basis, node_normals
@@ -156,3 +156,24 @@ def test_layers_follow_the_side_that_does_not_bulge():
 def test_layers_follow_the_middle_of_a_swell():
     u = gu.unfold(simulate("swelling", blocks=16000).folded)
     assert u.fits[0].notes["layers_follow"] == "mid"
+
+
+def test_sites_are_the_same_by_a_table_and_by_a_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    cells, steps = np.argwhere(np.random.default_rng(7).random((9, 8, 7)) < 0.8), np.ones(3)
+    by_table = surface_sites(cells, steps)
+    monkeypatch.setattr(lattice_sites, "_EMPTY", 0)
+    by_list = surface_sites(cells, steps)
+    assert 100 < len(by_table.points) == len(by_list.points)
+    assert (by_table.points == by_list.points).all()
+    assert (by_table.occupied == by_list.occupied).all()
+
+
+def test_feet_do_not_depend_on_how_the_points_are_sliced(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = SplineGrid.over(np.zeros(2), np.full(2, 30.0), 3.5)
+    C = np.concatenate([grid.nodes, np.sin(grid.nodes[:, :1] / 9)], axis=1)
+    sheet = MidSurface(grid, C, np.zeros(2), np.full(2, 30.0), 1.5)
+    points = np.random.default_rng(3).uniform(0, 30, (500, 3)) * [1, 1, 0.1]
+    whole = sheet.search().feet(points)
+    monkeypatch.setattr(surface, "SLICE", 64)
+    for one, other in zip(whole, sheet.search().feet(points), strict=True):
+        assert (one == other).all()

@@ -1,11 +1,12 @@
 """Variogram models fitted to samples automatically.
 
 The model is fitted to normal scores of the grades by restricted maximum likelihood on subsets of
-holes, and carried back to the grades (`likelihood`, `normal_scores`). A second structure, or a
-second direction in the layer, must pass two tests. The likelihood grows by more than the parameters
-that it adds would by chance (Schwarz 1978, Annals of Statistics 6: 461-464). And whole-hole
-cross-validation of the grades has a smaller error (`left_out`): real grades are not stationary, so
-their likelihood alone prefers two structures that estimate worse (docs/study-variograms.md).
+holes, and carried back to the grades (`likelihood`, `normal_scores`). A second direction in the
+layer, or a second structure, is kept if the likelihood grows by more than the parameters that it
+adds would by chance (Schwarz 1978, Annals of Statistics 6: 461-464). A second structure must also
+lower the error of whole-hole cross-validation by two standard errors (`left_out`): real grades are
+not stationary, and likelihood alone prefers two structures that estimate worse
+(docs/results/variograms.md).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from geounfold.estimation.experimental import (
 )
 from geounfold.estimation.least_squares import fitted_cells, three
 from geounfold.estimation.left_out import LeftOut
-from geounfold.estimation.likelihood import AXES, Shape, Subsets, first_shape, packed
+from geounfold.estimation.likelihood import AXES, Shape, Subsets, first_shape, packed, turned_start
 from geounfold.estimation.normal_scores import hermite_shares, normal_scores, shape_of_grades
 from geounfold.estimation.variogram import KINDS, Structure, Triple, Variogram, numbers
 from geounfold.geometry.mesh import Floats, Ints
@@ -269,17 +270,6 @@ def _likeliest(
     low, high = _BOUNDS[0] * extent, _BOUNDS[1] * extent
     penalty = 0.5 * np.log(len(P))
     shares = hermite_shares(v) if scores else None
-    left_out = LeftOut(P, v, holes)
-
-    def better(more: Shape, less: Shape, parameters: int) -> bool:
-        if more.value + parameters * penalty >= less.value or not _plausible(more, extent):
-            return False
-        new, old = (
-            left_out.errors(_model_of(_of_grades(s, shares), 1.0, (0.0, 0.0, 0.0)))
-            for s in (more, less)
-        )
-        return bool((new**2).sum() < (old**2).sum())
-
     plain = "transverse" if anisotropy == "auto" else anisotropy
     start, _ = first_shape(subsets, plain, low, high)
     tried = []
@@ -288,14 +278,20 @@ def _likeliest(
         start = tried[0].vector
     best, found = min(tried, key=lambda shape: shape.value), plain
     if anisotropy == "auto":
-        start, _ = first_shape(subsets, "orthotropic", low, high)
-        other = subsets.fit(best.kinds, "orthotropic", start, low, high)
-        if better(other, best, 2):
+        other = _turned(subsets, tried, best, low, high)
+        if other.value + 2 * penalty < best.value and not other.bounds:
             best, found = other, "orthotropic"
     if structures == 2:
         nested = _nested(subsets, best, found, low, high)
-        if better(nested, best, 2 + max(AXES[found])):
-            best = nested
+        count = 2 + max(AXES[found])
+        if nested.value + count * penalty < best.value and _plausible(nested, extent):
+            left_out = LeftOut(P, v, holes)
+            new, old = (
+                left_out.errors(_model_of(_of_grades(s, shares), 1.0, (0.0, 0.0, 0.0)))
+                for s in (nested, best)
+            )
+            if left_out.better(new, old):
+                best = nested
     variance = float(v.var()) * subsets.variance(best, found) / float(y.var())
     return _of_grades(best, shares), variance, found
 
@@ -303,6 +299,24 @@ def _likeliest(
 def _of_grades(shape: Shape, shares: Floats | None) -> Shape:
     """Return the model of the grades; without Hermite shares it is the shape itself."""
     return shape if shares is None else shape_of_grades(shape, shares)
+
+
+def _turned(
+    subsets: Subsets, level: Sequence[Shape], best: Shape, low: Floats, high: Floats
+) -> Shape:
+    """Return the best model with two directions in the plane.
+
+    The likelihood of rough kinds has many maxima, so the second start is the model of the smoothest
+    kind that was tried but the gaussian: its likelihood has few.
+    """
+    smooth = next((shape for shape in level if shape.kinds == ("matern",)), best)
+    found = []
+    for one in {id(best): best, id(smooth): smooth}.values():
+        start = turned_start(subsets, one, low, high)
+        found.append(subsets.fit(one.kinds, "orthotropic", start, low, high))
+    if smooth is not best:
+        found.append(subsets.fit(best.kinds, "orthotropic", found[-1].vector, low, high))
+    return min(found, key=lambda shape: shape.value)
 
 
 def _nested(subsets: Subsets, one: Shape, anisotropy: str, low: Floats, high: Floats) -> Shape:

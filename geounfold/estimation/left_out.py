@@ -57,6 +57,18 @@ class LeftOut:
             out[rows] = estimate - self._values[self.targets[rows]]
         return out
 
+    def better(self, new: Floats, old: Floats) -> bool:
+        """Return whether squared errors are smaller by two standard errors of their sum over holes.
+
+        Parameters
+        ----------
+        new, old : (m,) float
+            Errors of two models, from `errors`.
+        """
+        _, hole = np.unique(self._holes[self.targets], return_inverse=True)
+        gain = np.bincount(hole.ravel(), old**2 - new**2)
+        return bool(gain.sum() > 2 * np.sqrt((gain**2).sum()))
+
     def _kriged(self, targets: Floats, rows: Ints, counts: Ints, model: Variogram) -> Floats:
         """Return ordinary kriging estimates of targets from the samples of each."""
         count, most = rows.shape

@@ -1,6 +1,6 @@
 """Restricted maximum likelihood of variogram models on subsets of holes.
 
-The likelihood of all samples together needs a matrix of all pairs, so subsets of `SIZE` samples are
+The likelihood of all samples together needs a matrix of all pairs, so subsets of 100 to 500 samples are
 used, each with a mean of its own (composite likelihood: Curriero and Lele 1999, Journal of
 Agricultural, Biological and Environmental Statistics 4: 9-28; restricted likelihood: Kitanidis
 1983, Water Resources Research 19: 909-921). Half of the subsets are neighbouring holes, whose
@@ -14,14 +14,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 
 from geounfold.estimation.neighbourhood import Neighbourhood, Search, turn_of
 from geounfold.estimation.variogram import SMOOTHNESS, correlation, matern_scale
 from geounfold.geometry.mesh import Floats, Ints
 
-SIZE = 100  # samples of a subset
+SIZES = 100, 500
+"""Fewest and most samples of a subset; between, as many as `_WORK` allows: one of all is best."""
+
 MOST_SUBSETS = 60
+_WORK = 6e7  # samples times the squared size of their subsets: a fit then takes a second or less
 _OF_A_HOLE = 12, 4  # most samples of a hole in a subset of neighbours, and in one spread out
 _JITTER = 1e-6  # on the diagonal, as a share of the sill
 _STEPS = 60  # of the optimiser; fits take 10 to 50 (measured)
@@ -83,6 +87,8 @@ class Subsets:
         gaps = points[self.rows][:, i] - points[self.rows][:, j]
         self.gaps = np.ascontiguousarray(gaps.reshape(-1, 3).T)
         self.shape = count, size
+        self._places = i * size + j
+        self._sides = np.stack([self.values, np.ones(self.values.shape)], axis=2)
         # Subsets repeat samples: a likelihood counts each sample once.
         self.weight = min(1.0, len(points) / self.rows.size)
 
@@ -190,27 +196,29 @@ class Subsets:
     def _reml(self, pairs: Floats) -> tuple[float, Floats, float]:
         """Return minus the log likelihood of correlations, its derivative by each, the variance."""
         count, size = self.shape
-        i, j = self._lower
-        C = np.empty((count, size, size))
-        C[:, i, j] = pairs.reshape(count, -1)
-        C[:, j, i] = C[:, i, j]
-        C[:, np.arange(size), np.arange(size)] = 1.0 + _JITTER
-        lower = np.linalg.cholesky(C)
-        inverse = np.linalg.inv(C)
-        ones = inverse.sum(axis=2)
-        total = ones.sum(axis=1)
-        raw = (inverse @ self.values[:, :, None])[:, :, 0]
-        left = raw - ones * (raw.sum(axis=1) / total)[:, None]
+        C = np.zeros((count, size * size))
+        C[:, self._places] = pairs.reshape(count, -1)
+        C[:, :: size + 1] = 1.0 + _JITTER
+        raw = np.empty((count, size, 2))
+        value = 0.0
+        for k in range(count):
+            # LAPACK reads columns, so the lower triangle of these rows is its upper one.
+            factor, failed = dpotrf(C[k].reshape(size, size).T, lower=0, overwrite_a=1)
+            if failed:
+                raise np.linalg.LinAlgError(f"subset {k} has a singular matrix")
+            value += float(np.log(np.diagonal(factor)).sum())
+            raw[k] = dpotrs(factor, self._sides[k], lower=0)[0]
+            C[k] = dpotri(factor, lower=0, overwrite_c=1)[0].T.ravel()
+        ones, total = raw[:, :, 1], raw[:, :, 1].sum(axis=1)
+        left = raw[:, :, 0] - ones * (raw[:, :, 0].sum(axis=1) / total)[:, None]
         free = count * (size - 1)
         variance = float((left * self.values).sum()) / free
-        value = (
-            np.log(np.diagonal(lower, axis1=1, axis2=2)).sum()
-            + 0.5 * np.log(total).sum()
-            + 0.5 * free * np.log(variance)
-        )
-        slope = inverse - ones[:, :, None] * (ones / total[:, None])[:, None, :]
-        slope -= left[:, :, None] * (left / variance)[:, None, :]
-        return float(value), np.ascontiguousarray(slope[:, i, j]).ravel(), variance
+        value += 0.5 * float(np.log(total).sum()) + 0.5 * free * float(np.log(variance))
+        i, j = self._lower
+        slope = C[:, self._places]
+        slope -= ones[:, i] * (ones / total[:, None])[:, j]
+        slope -= left[:, i] * (left / variance)[:, j]
+        return value, slope.ravel(), variance
 
 
 def chosen_subsets(points: Floats, holes: Ints | None) -> Ints:
@@ -222,8 +230,8 @@ def chosen_subsets(points: Floats, holes: Ints | None) -> Ints:
         There are too few samples apart from each other.
     """
     n = len(points)
-    size = min(SIZE, n)
-    if size == n:
+    size = int(np.clip(np.sqrt(_WORK / n), *SIZES))
+    if size >= n:
         return np.arange(n)[None]
     rng = np.random.default_rng(0)
     count = int(np.clip(-(-2 * n // size), 2, MOST_SUBSETS))
@@ -271,6 +279,21 @@ def first_shape(
             tried.append((subsets.objective(x0, ("exponential",), anisotropy)[0], x0))
     best = min(tried, key=lambda pair: pair[0])
     return best[1], best[0]
+
+
+def turned_start(subsets: Subsets, level: Shape, low: Floats, high: Floats) -> Floats:
+    """Return the start of a fit with two directions in the plane, from a fit with one.
+
+    Of eight turns and two ratios of the ranges the best is taken.
+    """
+    tried = []
+    for ratio in (1.5, 3.0):
+        root = np.sqrt(ratio)
+        ranges = np.clip(level.ranges * [root, 1 / root, 1.0], 1.01 * low, 0.99 * high)
+        for turn in np.arange(8) * np.pi / 8:
+            x = packed(level.shares, ranges, float(turn), "orthotropic")
+            tried.append((subsets.objective(x, level.kinds, "orthotropic")[0], x))
+    return min(tried, key=lambda pair: pair[0])[1]
 
 
 def packed(shares: Floats, ranges: Floats, turn: float, anisotropy: str) -> Floats:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from geounfold.errors import InputError, OptionError, check_number
+from geounfold.errors import InputError, OptionError, check_number, check_numbers
 from geounfold.estimation.declustering import Declustering, decluster
 from geounfold.estimation.fit import FittedVariogram, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples, in_body
@@ -23,9 +23,10 @@ from geounfold.estimation.kriging import (
     gathered,
     krige,
 )
-from geounfold.estimation.neighbourhood import Neighbourhood, least_factor
+from geounfold.estimation.neighbourhood import LIMITS, Neighbourhood, least_factor
 from geounfold.estimation.position_error import with_position_error
 from geounfold.estimation.scores import Conservation, conservation
+from geounfold.estimation.systems import discretised, local_axes
 from geounfold.estimation.variogram import Triple, Variogram
 from geounfold.geometry.mesh import Floats
 from geounfold.io.grade_values import GradeRules, grade_rules
@@ -38,7 +39,6 @@ _REACH = 2.0
 """Search radii in variogram ranges, if the user gives none and all blocks find their samples."""
 
 _CLEAR = 1.001  # radii over the distance of the last sample that is needed
-_PLAIN = {"min_samples", "max_samples", "max_per_hole"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Estimation:
     samples : FlatSamples
         The samples used.
     method : str
-        ordinary, simple or inverse_distance.
+        ordinary, simple, inverse_distance or nearest.
     variogram : Variogram or None
         Model in the unfolded space; None for inverse distance.
     fitted : FittedVariogram or None
@@ -74,6 +74,10 @@ class Estimation:
     position_error : (float, float) or None
         Standard deviations of a place along and across the layers, with which the variogram was
         blurred for kriging; None if places count as exact.
+    support : BlockSupport or None
+        Blocks that are estimated as means; None for points at their centroids.
+    others : mapping of Estimates
+        Estimates by other methods from the same samples, by method.
     """
 
     grade: str
@@ -88,16 +92,21 @@ class Estimation:
     body_known: bool = True
     widened: tuple[float, int] | None = None
     position_error: tuple[float, float] | None = None
+    support: BlockSupport | None = None
+    others: Mapping[str, Estimates] = field(default_factory=dict)
 
     @property
     def columns(self) -> dict[str, Any]:
         """The results by column name: the grade with _estimate ... _flag, and location."""
-        b = self.blocks
+        b, grade = self.blocks, self.grade
+        more = {"efficiency": b.efficiency, "slope": b.slope}
         return {
-            f"{self.grade}_estimate": b.estimate,
-            f"{self.grade}_variance": b.variance,
-            f"{self.grade}_samples": b.samples,
-            f"{self.grade}_flag": b.flag,
+            f"{grade}_estimate": b.estimate,
+            f"{grade}_variance": b.variance,
+            **{f"{grade}_{n}": values for n, values in more.items() if values is not None},
+            **{f"{grade}_{method}": found.estimate for method, found in self.others.items()},
+            f"{grade}_samples": b.samples,
+            f"{grade}_flag": b.flag,
             "location": self.carried.location,
         }
 
@@ -106,8 +115,15 @@ class Estimation:
         """The results as a table, one row per block."""
         return pd.DataFrame(self.columns)
 
-    def cross_validation(self) -> Estimates:
+    def cross_validation(self, method: str | None = None) -> Estimates:
         """Return every sample estimated by the same rules from the other holes only.
+
+        Samples are points, also if blocks are estimated.
+
+        Parameters
+        ----------
+        method : str, optional
+            Another method than the estimates'.
 
         Raises
         ------
@@ -120,8 +136,9 @@ class Estimation:
                 "cross-validation leaves out whole holes: give the name of the samples' hole column"
             )
         return cross_validate(
-            s.points, s.grades, s.holes, self._kriged_with, self.neighbourhood, method=self.method
-        )
+            s.points, s.grades, s.holes, self._kriged_with, self.neighbourhood,
+            method=method or self.method,
+        )  # fmt: skip
 
     @property
     def _kriged_with(self) -> Variogram | None:
@@ -152,6 +169,11 @@ class Estimation:
             for flag in FLAGS[1:]
             if counts[flag]
         ]
+        if self.support is not None and self.support.plain:
+            lines.append(
+                f"{self.support.plain} of {len(self.blocks.flag)} blocks reach out of the map on "
+                "both sides: their support keeps the folded axes"
+            )
         if not self.body_known and (counts[OUTSIDE_BODY] or self.samples.wall_rock):
             lines.append(
                 "the map does not hold the body's blocks: what lies inside its control mesh, "
@@ -167,7 +189,12 @@ class Estimation:
         return {
             "grade": self.grade,
             "method": self.method,
-            "support": "points at the blocks' centroids",
+            "support": "points at the blocks' centroids"
+            if self.support is None
+            else {
+                "block_size": list(self.support.sizes),
+                "discretised": list(self.support.numbers),
+            },
             "variogram": None if self.variogram is None else self.variogram.facts(),
             "position_error": self.position_error,
             "variogram_fitted": self.fitted is not None,
@@ -179,6 +206,9 @@ class Estimation:
                 "min_samples": near.min_samples,
                 "max_samples": near.max_samples,
                 "max_per_hole": near.max_per_hole,
+                "max_per_octant": near.max_per_octant,
+                "min_holes": near.min_holes,
+                "min_octants": near.min_octants,
                 "widened": None if self.widened is None else self.widened[0],
             },
             "samples": self.samples.facts(),
@@ -186,11 +216,60 @@ class Estimation:
             "mean_of_samples": float(self.samples.grades.mean()),
             "declustered": None if self.declustering is None else self.declustering.facts(),
             "mean_of_blocks": float(known.mean()) if len(known) else None,
+            "other_methods": {m: _mean(found.estimate) for m, found in self.others.items()},
+            "kriging_efficiency": _mean(self.blocks.efficiency),
+            "regression_slope": _mean(self.blocks.slope),
             "warnings": self.warnings(),
         }
 
 
-def estimate(  # 18 arguments: a public name; fourteen of them are choices by keyword
+@dataclass(frozen=True, eq=False)
+class BlockSupport:
+    """Blocks that are estimated as means of points inside them, carried to the unfolded space.
+
+    Attributes
+    ----------
+    sizes : (float, float, float)
+        Sides along the folded x, y and z.
+    numbers : (int, int, int)
+        Points along each side.
+    axes : (m, 3, 3) float
+        Images of the folded axes at each block (`systems.local_axes`).
+    plain : int
+        Number of blocks that keep the folded axes along one axis at least.
+    """
+
+    sizes: Triple
+    numbers: tuple[int, int, int]
+    axes: Floats
+    plain: int
+
+    @classmethod
+    def of(cls, carrier: Any, centres: Floats, sizes: Any, numbers: Any) -> BlockSupport:
+        """Return the support of blocks with their centroids, (m, 3), in the folded space.
+
+        Raises
+        ------
+        OptionError
+            A side is not above 0, or a number of points is not a whole number of 1 or more.
+        """
+        check_numbers("block_size", sizes, 3)
+        a, b, c = (float(side) for side in sizes)
+        if min(a, b, c) <= 0:
+            raise OptionError(f"block_size must have sides above 0, not {a:g}, {b:g}, {c:g}")
+        count = tuple(numbers)
+        if len(count) != 3 or not all(isinstance(n, int) and 1 <= n <= 20 for n in count):
+            raise OptionError(f"discretise must be three whole numbers from 1 to 20, not {numbers}")
+        axes, plain = local_axes(carrier, centres, np.array([a, b, c]))
+        return cls((a, b, c), (count[0], count[1], count[2]), axes, plain)
+
+
+def _mean(values: Floats | None) -> float | None:
+    known = np.zeros(0) if values is None else values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
+def estimate(  # 21 arguments: a public name; seventeen of them are choices by keyword
     unfolding: Any,
     samples: pd.DataFrame,
     blocks: pd.DataFrame | Floats | None = None,
@@ -209,6 +288,9 @@ def estimate(  # 18 arguments: a public name; fourteen of them are choices by ke
     soft_boundary: float = 0.0,
     all_blocks: bool = False,
     cells: Any = None,
+    block_size: Triple | None = None,
+    discretise: tuple[int, int, int] = (3, 3, 3),
+    also: Sequence[Method] = (),
     position_error: tuple[float, float] | None = None,
 ) -> Estimation:
     """Estimate a grade on folded blocks from folded samples, in the unfolded space.
@@ -228,8 +310,8 @@ def estimate(  # 18 arguments: a public name; fourteen of them are choices by ke
         Column of the samples to estimate. Rows without a value are left out and counted.
     hole : str, optional
         Column of the hole's name. The default is the one column with a usual name, if any.
-    method : {"ordinary", "simple", "inverse_distance"}
-        Ordinary kriging, simple kriging or inverse distance.
+    method : {"ordinary", "simple", "inverse_distance", "nearest"}
+        Ordinary kriging, simple kriging, inverse distance or the nearest sample.
     neighbourhood : Neighbourhood or mapping, optional
         The search neighbourhood, or a mapping of some of its parameters. Without radii, the
         radii are twice the variogram's ranges, along its axes, or as much more as blocks and
@@ -253,7 +335,14 @@ def estimate(  # 18 arguments: a public name; fourteen of them are choices by ke
     cells : (float, float, float) or "auto", optional
         Sides of the cells that weigh clustered samples, in the unfolded space (`decluster`). The
         weights are for statistics, and for the mean of simple kriging.
-
+    block_size : (float, float, float), optional
+        Sides of the blocks along the folded x, y and z: kriging then estimates means of blocks,
+        with kriging efficiency and slope of regression. The default is points at the centroids.
+    discretise : (int, int, int)
+        Points along each side of a block, each in its own part of it, carried to the unfolded space
+        by the map's stretch at the block.
+    also : methods
+        Other methods that estimate the same blocks from the same samples, side by side.
     position_error : (float, float), optional
         Standard deviations of a place along and across the layers, in the points' unit, by which
         the variogram is blurred (`with_position_error`). The default is that of an Unfolding with
@@ -292,39 +381,61 @@ def estimate(  # 18 arguments: a public name; fourteen of them are choices by ke
     own = np.ones(len(carried.points), dtype=bool)
     if blocks is not None and not all_blocks:
         own = in_body(carrier, centres, carried)
-    if weighed is not None and method == "simple" and mean is None:
+    if weighed is not None and mean is None and "simple" in (method, *also):
         mean = weighed.mean
-    fitted = None
-    if variogram is None and (method != "inverse_distance" or _needs_radii(neighbourhood)):
+    fitted, kriged = None, not {"ordinary", "simple"}.isdisjoint((method, *also))
+    if variogram is None and (kriged or _needs_radii(neighbourhood)):
         fitted = fit_variogram(flat.points, flat.grades, holes=flat.holes)
         variogram = fitted.model
     if position_error is None and getattr(unfolding, "uncertainty", None) is not None:
         position_error = unfolding.uncertainty.mean
     targets = np.where(own[:, None], carried.points, np.nan)
     near, widened = _neighbourhood(neighbourhood, variogram, flat, targets)
-    found = krige(
-        flat.points, flat.grades, targets, _blurred(variogram, position_error), near,
-        method=method, holes=flat.holes, mean=mean, power=power, workers=workers,
-    )  # fmt: skip
+    support = None
+    if block_size is not None:
+        folded = unfolding.folded if blocks is None else centres
+        support = BlockSupport.of(carrier, folded, block_size, discretise)
+    rules = _Rules(
+        flat, targets, _blurred(variogram, position_error), near, mean, power, workers, support
+    )
+    found: dict[str, Estimates] = {m: rules.krige(m) for m in dict.fromkeys((method, *also))}
     reached = np.isfinite(carried.points).all(axis=1)
-    found = replace(found, flag=np.where(reached & ~own, OUTSIDE_BODY, found.flag))
-    if method == "inverse_distance":
+    outside = reached & ~own
+    for each, e in found.items():
+        found[each] = replace(e, flag=np.where(outside, OUTSIDE_BODY, e.flag))
+    if not kriged:
         variogram = fitted = None
     known = getattr(carrier, "body", None) is not None
+    main = found.pop(method)
     return Estimation(
-        grade,
-        found,
-        carried,
-        flat,
-        method,
-        variogram,
-        fitted,
-        near,
-        weighed,
-        known,
-        widened,
-        position_error,
-    )
+        grade, main, carried, flat, method, variogram, fitted, near, weighed, known, widened,
+        position_error, support, found,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Rules:
+    """What the methods of one run have in common."""
+
+    flat: FlatSamples
+    targets: Floats
+    variogram: Variogram | None
+    near: Neighbourhood
+    mean: float | None
+    power: float
+    workers: int
+    support: BlockSupport | None
+
+    def krige(self, method: Method) -> Estimates:
+        """Return the estimates of a method."""
+        s, flat, blocks = self.support, self.flat, None
+        if s is not None and method in ("ordinary", "simple"):
+            blocks = discretised(np.array(s.sizes), s.numbers), s.axes
+        return krige(
+            flat.points, flat.grades, self.targets, self.variogram, self.near,
+            method=method, holes=flat.holes, mean=self.mean, power=self.power,
+            workers=self.workers, blocks=blocks,
+        )  # fmt: skip
 
 
 def _blurred(
@@ -367,7 +478,7 @@ def _neighbourhood(
     if isinstance(given, Neighbourhood):
         return given, None
     words = dict(given or {})
-    unknown = set(words) - _PLAIN - {"radii", "rotation"}
+    unknown = set(words) - set(LIMITS) - {"radii", "rotation"}
     if unknown:
         raise OptionError(f"a neighbourhood has no parameter {sorted(unknown)[0]!r}")
     if "radii" in words:

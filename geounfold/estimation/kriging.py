@@ -15,11 +15,12 @@ from geounfold.backends import gstlearn
 from geounfold.backends.blas import one_thread
 from geounfold.errors import InputError, OptionError
 from geounfold.estimation.neighbourhood import Neighbourhood, Search
+from geounfold.estimation.systems import solve_systems
 from geounfold.estimation.variogram import Variogram
 from geounfold.estimation.worker import apart
 from geounfold.geometry.mesh import Bools, Floats, Ints
 
-Method = Literal["ordinary", "simple", "inverse_distance"]
+Method = Literal["ordinary", "simple", "inverse_distance", "nearest"]
 METHODS: tuple[str, ...] = get_args(Method)
 
 ESTIMATED, TOO_FEW, OUTSIDE, UNSOLVABLE, OUTSIDE_BODY = (
@@ -50,12 +51,17 @@ class Estimates:
         Number of samples found around each target.
     flag : (m,) str
         estimated, too_few_samples, outside_map, unsolvable or outside_body.
+    efficiency, slope : (m,) float or None
+        Kriging efficiency and slope of the regression of true on estimated grades
+        (`systems.Solved`); None unless blocks were given.
     """
 
     estimate: Floats
     variance: Floats
     samples: Ints
     flag: np.ndarray
+    efficiency: Floats | None = None
+    slope: Floats | None = None
 
     def counts(self) -> dict[str, int]:
         """Return how many targets have each flag."""
@@ -113,7 +119,7 @@ def gathered(points: Floats, values: Floats, holes: Ints | None = None) -> Sampl
     return Samples(places, mean, lowest, len(P) - len(places))
 
 
-def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
+def krige(  # 12 arguments: the samples, the targets, and seven choices by keyword
     points: Floats,
     values: Floats,
     targets: Floats,
@@ -126,6 +132,7 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
     mean: float | None = None,
     power: float = 2.0,
     workers: int = 1,
+    blocks: tuple[Floats, Floats] | None = None,
 ) -> Estimates:
     """Estimate targets from the samples around each.
 
@@ -141,8 +148,9 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
         Model; None for inverse distance only.
     near : Neighbourhood
         Search neighbourhood. Inverse distances are measured in units of its radii.
-    method : {"ordinary", "simple", "inverse_distance"}
-        Ordinary kriging has an unknown mean, simple kriging a given one.
+    method : {"ordinary", "simple", "inverse_distance", "nearest"}
+        Ordinary kriging has an unknown mean, simple kriging a given one; nearest takes the value of
+        the nearest sample in units of the radii.
     holes : (n,) int, optional
         Number of each sample's hole, needed by `max_per_hole` and `leave_out`.
     leave_out : (m,) int, optional
@@ -153,6 +161,10 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
         Power of inverse distance, above 0.
     workers : int
         Number of processes at a time. Above 131,072 targets other processes are used in any case.
+    blocks : ((q, 3) float, (m, 3, 3) float), optional
+        Block support for kriging: the points that each target is the mean of, from its centre
+        (`systems.discretised`), and the images of the axes at each target (`systems.local_axes`).
+        The answer then has efficiencies and slopes.
 
     Returns
     -------
@@ -177,21 +189,23 @@ def krige(  # 11 arguments: the samples, the targets, and six choices by keyword
     there = np.flatnonzero(np.isfinite(T).all(axis=1))
     # Sorted, so that the answer does not depend on the order of the input rows.
     there = there[np.lexsort(T[there].T)]
-    job = _Job(given, variogram, near, method, mean if method == "simple" else None, power)
-    parts = _run(job, T[there], None if leave_out is None else leave_out[there], workers)
-    out = Estimates(
-        np.full(len(T), np.nan),
-        np.full(len(T), np.nan),
-        np.zeros(len(T), dtype=np.int64),
-        np.full(len(T), OUTSIDE, dtype=object),
-    )
-    for start, (value, variance, count, flag) in zip(
-        range(0, len(there), _CHUNK), parts, strict=True
-    ):
+    kriged = method in ("ordinary", "simple")
+    points_of = None if blocks is None or not kriged else np.asarray(blocks[0], dtype=np.float64)
+    known = mean if method == "simple" else None
+    job = _Job(given, variogram, near, method, known, power, points_of)
+    axes = None if points_of is None or blocks is None else np.asarray(blocks[1])[there]
+    own = None if leave_out is None else leave_out[there]
+    parts = _run(job, T[there], own, axes, workers)
+    more = 0 if points_of is None else 2
+    columns = [np.full(len(T), np.nan) for _ in range(2 + more)]
+    samples = np.zeros(len(T), dtype=np.int64)
+    flags = np.full(len(T), OUTSIDE, dtype=object)
+    for start, (found, count, flag) in zip(range(0, len(there), _CHUNK), parts, strict=True):
         rows = there[start : start + _CHUNK]
-        out.estimate[rows], out.variance[rows] = value, variance
-        out.samples[rows], out.flag[rows] = count, flag
-    return out
+        for column, answer in zip(columns, found, strict=True):
+            column[rows] = answer
+        samples[rows], flags[rows] = count, flag
+    return Estimates(columns[0], columns[1], samples, flags, *columns[2:])
 
 
 def cross_validate(
@@ -221,7 +235,8 @@ def hole_numbers(names: Sequence[object] | np.ndarray) -> Ints:
     return number
 
 
-Part = tuple[Floats, Floats, Ints, np.ndarray]
+Part = tuple[list[Floats], Ints, np.ndarray]
+Piece = tuple[Floats, Ints | None, Floats | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,22 +249,39 @@ class _Job:
     method: str
     mean: float | None
     power: float
+    inside: Floats | None = None
 
-    def estimate(self, search: Search, targets: Floats, own: Ints | None) -> Part:
-        """Return values, variances, counts and flags of targets (m, 3)."""
+    def estimate(
+        self, search: Search, targets: Floats, own: Ints | None, axes: Floats | None
+    ) -> Part:
+        """Return values and variances (and more, of blocks), counts and flags of targets (m, 3)."""
         with one_thread():
             found = search.find(targets, own)
         flag = np.full(len(targets), TOO_FEW, dtype=object)
-        value, variance = np.full(len(targets), np.nan), np.full(len(targets), np.nan)
+        columns = [np.full(len(targets), np.nan) for _ in range(2 if self.inside is None else 4)]
         enough = np.flatnonzero(found.counts >= self.near.min_samples)
         if len(enough):
             rows, counts = found.rows[enough], found.counts[enough]
             offset = self.given.points[rows] - targets[enough, None]
-            value[enough], variance[enough] = self._solved(offset, self.given.values[rows], counts)
-            flag[enough] = np.where(np.isnan(value[enough]), UNSOLVABLE, ESTIMATED)
-        return value, variance, found.counts, flag
+            values = self.given.values[rows]
+            if self.inside is None or axes is None or self.variogram is None:
+                answers = self._solved(offset, values, counts)
+            else:
+                inside, used = (
+                    self.inside @ axes[enough],
+                    np.arange(rows.shape[1]) < counts[:, None],
+                )
+                with one_thread():
+                    got = solve_systems(self.variogram, offset, used, values, inside, self.mean)
+                answers = got.estimate, got.variance, got.efficiency, got.slope
+            for column, answer in zip(columns, answers, strict=True):
+                column[enough] = answer
+            flag[enough] = np.where(np.isnan(columns[0][enough]), UNSOLVABLE, ESTIMATED)
+        return columns, found.counts, flag
 
-    def _solved(self, offset: Floats, values: Floats, counts: Ints) -> tuple[Floats, Floats]:
+    def _solved(self, offset: Floats, values: Floats, counts: Ints) -> tuple[Floats, ...]:
+        if self.method == "nearest":  # the first of each row
+            return values[:, 0], np.full(len(values), np.nan)
         if self.variogram is None or self.method == "inverse_distance":
             measured = self.near.measured(offset.reshape(-1, 3)).reshape(offset.shape)
             answer = gstlearn.inverse_distance(measured, values, counts, self.power)
@@ -275,10 +307,15 @@ class _Job:
 _WORST = 20.0  # sills; a variance above it shows that the kriging system was not solved
 
 
-def _run(job: _Job, targets: Floats, own: Ints | None, workers: int) -> list[Part]:
+def _run(
+    job: _Job, targets: Floats, own: Ints | None, axes: Floats | None, workers: int
+) -> list[Part]:
     """Return the answers for chunks of targets, in their order."""
     chunks = [slice(i, i + _CHUNK) for i in range(0, len(targets), _CHUNK)]
-    pieces = [(targets[c], None if own is None else own[c]) for c in chunks]
+    pieces: list[Piece] = [
+        (targets[c], None if own is None else own[c], None if axes is None else axes[c])
+        for c in chunks
+    ]
     if len(pieces) <= 1 or (workers == 1 and len(pieces) <= _LIFE):
         return solve(job, pieces)
     size = min(_LIFE, -(-len(pieces) // workers))
@@ -286,7 +323,7 @@ def _run(job: _Job, targets: Floats, own: Ints | None, workers: int) -> list[Par
     return [part for parts in apart(solve, jobs, workers) for part in parts]
 
 
-def solve(job: _Job, pieces: Sequence[tuple[Floats, Ints | None]]) -> list[Part]:
+def solve(job: _Job, pieces: Sequence[Piece]) -> list[Part]:
     """Return the answers for pieces of targets, in this process."""
     search = Search(job.given.points, job.given.holes, job.near)
     return [job.estimate(search, *piece) for piece in pieces]
@@ -304,10 +341,12 @@ def _check(
     """Raise OptionError if the method lacks something that it needs."""
     if method not in METHODS:
         raise OptionError(f"method {method!r} is not one of: {', '.join(METHODS)}")
-    if variogram is None and method != "inverse_distance":
+    if variogram is None and method in ("ordinary", "simple"):
         raise OptionError(f"{method} kriging needs a variogram")
     if holes is None and (near.max_per_hole is not None or leave_out is not None):
         raise OptionError("max_per_hole needs the hole of each sample")
+    if holes is None and near.min_holes > 1:
+        raise OptionError("min_holes needs the hole of each sample")
     if not (np.isfinite(power) and power > 0):
         raise OptionError(f"the power of inverse distance must be above 0, not {power}")
     if not isinstance(workers, int) or workers < 1:

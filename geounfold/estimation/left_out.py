@@ -1,7 +1,6 @@
 """Whole-hole cross-validation of variogram models, for choosing among them.
 
-Systems are solved here, all targets together, because a few hundred of them are solved sooner than
-a call of the library is set up. `kriging.cross_validate` has the same neighbours and answers.
+`kriging.cross_validate` has the same neighbours and answers.
 """
 
 from __future__ import annotations
@@ -9,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from geounfold.estimation.neighbourhood import Neighbourhood, Search
+from geounfold.estimation.systems import solve_systems
 from geounfold.estimation.variogram import Variogram
 from geounfold.geometry.mesh import Floats, Ints
 
@@ -16,7 +16,6 @@ TARGETS = 1500
 """Most samples that are estimated: their mean squared error then has a standard error of 4 %."""
 
 _NEAREST, _PER_HOLE = 24, 6
-_ROWS = 500  # systems in memory at a time
 
 
 class LeftOut:
@@ -48,14 +47,12 @@ class LeftOut:
             max_samples=_NEAREST, max_per_hole=_PER_HOLE,
         )  # fmt: skip
         targets = self._points[self.targets]
-        own = self._holes[self.targets]
-        found = Search(self._points, self._holes, near).find(targets, own)
-        out = np.empty(len(targets))
-        for start in range(0, len(targets), _ROWS):
-            rows = slice(start, start + _ROWS)
-            estimate = self._kriged(targets[rows], found.rows[rows], found.counts[rows], model)
-            out[rows] = estimate - self._values[self.targets[rows]]
-        return out
+        found = Search(self._points, self._holes, near).find(targets, self._holes[self.targets])
+        used = np.arange(found.rows.shape[1]) < found.counts[:, None]
+        places = self._points[found.rows] - targets[:, None]
+        at = np.zeros((len(targets), 1, 3))
+        solved = solve_systems(model, places, used, self._values[found.rows], at, None)
+        return np.asarray(solved.estimate - self._values[self.targets])
 
     def better(self, new: Floats, old: Floats) -> bool:
         """Return whether squared errors are smaller by two standard errors of their sum over holes.
@@ -68,20 +65,3 @@ class LeftOut:
         _, hole = np.unique(self._holes[self.targets], return_inverse=True)
         gain = np.bincount(hole.ravel(), old**2 - new**2)
         return bool(gain.sum() > 2 * np.sqrt((gain**2).sum()))
-
-    def _kriged(self, targets: Floats, rows: Ints, counts: Ints, model: Variogram) -> Floats:
-        """Return ordinary kriging estimates of targets from the samples of each."""
-        count, most = rows.shape
-        places = self._points[rows]
-        used = np.arange(most) < counts[:, None]
-        between = (places[:, :, None] - places[:, None]).reshape(-1, 3)
-        C = model.sill - model.gamma(between).reshape(count, most, most)
-        both = used[:, :, None] & used[:, None]
-        C = np.where(both, C, 0.0) + np.eye(most) * np.where(used, 1e-6 * model.sill, 1.0)[:, None]
-        c = model.sill - model.gamma((places - targets[:, None]).reshape(-1, 3))
-        c = np.where(used, c.reshape(count, most), 0.0)
-        sides = np.stack([c, used.astype(np.float64)], axis=2)
-        solved = np.linalg.solve(C, sides)
-        total = solved.sum(axis=1)
-        weights = solved[:, :, 0] + solved[:, :, 1] * ((1 - total[:, 0]) / total[:, 1])[:, None]
-        return np.asarray((weights * self._values[rows]).sum(axis=1))

@@ -1,7 +1,7 @@
 """Restricted maximum likelihood of variogram models on subsets of holes.
 
-The likelihood of all samples together needs a matrix of all pairs, so subsets of 100 to 500 samples are
-used, each with a mean of its own (composite likelihood: Curriero and Lele 1999, Journal of
+The likelihood of all samples together needs a matrix of all pairs, so subsets of 100 to 500 samples
+are used, each with a mean of its own (composite likelihood: Curriero and Lele 1999, Journal of
 Agricultural, Biological and Environmental Statistics 4: 9-28; restricted likelihood: Kitanidis
 1983, Water Resources Research 19: 909-921). Half of the subsets are neighbouring holes, whose
 composites in a row show the nugget; the other half are spread over all holes, which shows the

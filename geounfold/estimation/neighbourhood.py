@@ -12,6 +12,12 @@ from geounfold.estimation.variogram import Triple, numbers
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.geometry.rotations import rotation_from_angles as turned
 
+LIMITS = (
+    *("min_samples", "max_samples", "max_per_hole"),
+    *("max_per_octant", "min_holes", "min_octants"),
+)
+"""Names of the limits on samples."""
+
 _ROWS = 65_536  # targets searched at a time
 
 
@@ -31,6 +37,12 @@ class Neighbourhood:
         Most samples; the nearest are used, by distance in units of the radii.
     max_per_hole : int, optional
         Most samples of one hole; the nearest are used. The default is no limit.
+    max_per_octant : int, optional
+        Most samples of one octant of the ellipsoid; the nearest are used.
+    min_holes : int
+        Fewest holes; targets whose samples come from fewer are not estimated.
+    min_octants : int
+        Fewest octants with samples; targets with fewer are not estimated.
 
     Raises
     ------
@@ -43,15 +55,18 @@ class Neighbourhood:
     min_samples: int = 4
     max_samples: int = 24
     max_per_hole: int | None = None
+    max_per_octant: int | None = None
+    min_holes: int = 1
+    min_octants: int = 1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radii", numbers("the search radii", self.radii, 3))
         object.__setattr__(self, "rotation", numbers("the rotation", self.rotation, 3))
         if not min(self.radii) > 0:
             raise OptionError(f"the search radii must be above 0, but are {self.radii}")
-        for name in ("min_samples", "max_samples", "max_per_hole"):
+        for name in LIMITS:
             value = getattr(self, name)
-            if name == "max_per_hole" and value is None:
+            if name in ("max_per_hole", "max_per_octant") and value is None:
                 continue
             if not isinstance(value, int | np.integer) or value < 1:
                 raise OptionError(f"{name} must be a whole number of 1 or more, not {value!r}")
@@ -59,6 +74,8 @@ class Neighbourhood:
             raise OptionError(
                 f"min_samples ({self.min_samples}) must not exceed max_samples ({self.max_samples})"
             )
+        if self.min_octants > 8:
+            raise OptionError(f"min_octants must be 8 or less, not {self.min_octants}")
 
     @property
     def axes(self) -> Floats:
@@ -103,7 +120,8 @@ class Search:
 
     def __init__(self, points: Floats, holes: Ints | None, near: Neighbourhood) -> None:
         self._near = near
-        self._tree = cKDTree(near.measured(points))
+        self._places = near.measured(points)
+        self._tree = cKDTree(self._places)
         self._holes = holes
 
     def find(self, targets: Floats, own: Ints | None = None) -> Found:
@@ -120,12 +138,12 @@ class Search:
         m, most = len(targets), min(near.max_samples, self._tree.n)
         rows, counts = np.zeros((m, most), dtype=np.int64), np.zeros(m, dtype=np.int64)
         left = np.arange(m)
-        simple = near.max_per_hole is None and own is None
+        simple = near.max_per_hole is None and near.max_per_octant is None and own is None
         asked = most if simple else min(2 * most, self._tree.n)
         while len(left):
             found = self._tree.query(places[left], k=asked, distance_upper_bound=1.0)[1]
             found = found.reshape(len(left), asked)
-            keep = self._allowed(found, None if own is None else own[left])
+            keep = self._allowed(found, None if own is None else own[left], places[left])
             keep &= np.cumsum(keep, axis=1) <= most
             count = keep.sum(axis=1)
             # A row whose last candidate lies within reach may have more samples: search it again.
@@ -135,11 +153,41 @@ class Search:
             counts[left[done]] = count[done]
             left = left[short]
             asked = min(4 * asked, self._tree.n)
+        if near.min_holes > 1 or near.min_octants > 1:
+            counts[self._scarce(rows, counts, places)] = 0
         return Found(rows, counts)
 
-    def _allowed(self, found: Ints, own: Ints | None) -> Bools:
+    def _octants(self, rows: Ints, places: Floats) -> Ints:
+        """Return the octant, 0 to 7, of samples (m, k) seen from targets (m, 3)."""
+        gaps = self._places[rows] - places[:, None]
+        out: Ints = (gaps >= 0).astype(np.int64) @ np.array([1, 2, 4])
+        return out
+
+    def _scarce(self, rows: Ints, counts: Ints, places: Floats) -> Bools:
+        """Return which targets have samples of too few holes or octants."""
+        used = np.arange(rows.shape[1]) < counts[:, None]
+        out = np.zeros(len(rows), dtype=bool)
+        if self._near.min_holes > 1 and self._holes is not None:
+            hole = np.where(used, self._holes[rows], -1)
+            first = used & (turn_of(hole) == 0)
+            out |= first.sum(axis=1) < self._near.min_holes
+        if self._near.min_octants > 1:
+            octant = np.where(used, self._octants(rows, places), -1)
+            first = used & (turn_of(octant) == 0)
+            out |= first.sum(axis=1) < self._near.min_octants
+        return out
+
+    def _allowed(self, found: Ints, own: Ints | None, places: Floats) -> Bools:
         """Return which of the samples found, (m, k) nearest first, may be used."""
         keep: Bools = found < self._tree.n
+        most = self._near.max_per_octant
+        if most is not None:
+            rows = np.where(keep, found, 0)
+            holes = None if self._holes is None else self._holes[rows]
+            if own is not None and holes is not None:
+                keep &= holes != own[:, None]
+            per_hole = self._near.max_per_hole if holes is not None else None
+            return _taken(keep, self._octants(rows, places), most, holes, per_hole)
         if self._holes is None:
             return keep
         hole = self._holes[np.where(keep, found, 0)]
@@ -149,6 +197,20 @@ class Search:
             hole = np.where(keep, hole, -1)
             keep &= turn_of(hole) < self._near.max_per_hole
         return keep
+
+
+def _taken(
+    free: Bools, octant: Ints, per_octant: int, hole: Ints | None, per_hole: int | None
+) -> Bools:
+    """Return which samples are taken, (m, k), one after the other: a limit counts those taken."""
+    keep = np.zeros_like(free)
+    for j in range(free.shape[1]):
+        before = keep[:, :j]
+        take = (before & (octant[:, :j] == octant[:, j : j + 1])).sum(axis=1) < per_octant
+        if hole is not None and per_hole is not None:
+            take &= (before & (hole[:, :j] == hole[:, j : j + 1])).sum(axis=1) < per_hole
+        keep[:, j] = free[:, j] & take
+    return keep
 
 
 def least_factor(
@@ -184,6 +246,7 @@ def least_factor(
     wider = Neighbourhood(
         radii=(a, b, c), rotation=near.rotation, min_samples=near.min_samples,
         max_samples=near.min_samples, max_per_hole=near.max_per_hole,
+        max_per_octant=near.max_per_octant,
     )  # fmt: skip
     search = Search(points, holes, wider)
     for start in range(0, len(there), _ROWS):

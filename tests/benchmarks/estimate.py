@@ -16,6 +16,7 @@ import numpy as np
 
 from geounfold.backends import gstlearn
 from geounfold.estimation import Neighbourhood, Structure, Variogram, krige
+from geounfold.estimation.systems import discretised
 
 MODEL = Variogram(0.1, (Structure("spherical", 0.9, (200, 200, 20)),))
 CALLED = (
@@ -30,6 +31,16 @@ def problem(targets):
     box = np.array([1000.0, 1000.0, 100.0])
     places = rng.random((20_000, 3)) * box, rng.normal(size=20_000), rng.integers(0, 400, 20_000)
     return *places, rng.random((targets, 3)) * box
+
+
+def timed_blocks(near):
+    """Return microseconds a block of 3 x 3 x 3 points, in this process."""
+    points, values, _, places = problem(50_000)
+    inside = discretised(np.array([10.0, 10.0, 5.0]), (3, 3, 3))
+    axes = np.broadcast_to(np.eye(3), (len(places), 3, 3))
+    start = time.perf_counter_ns()
+    krige(points, values, places, MODEL, near, blocks=(inside, axes))
+    return (time.perf_counter_ns() - start) / 1e3 / len(places)
 
 
 def timed(near, holes_too):
@@ -75,6 +86,9 @@ def main():
             "us per target": round(microseconds),
             "share outside gstlearn": round(share, 3),
         }
+    out["blocks, no limit per hole"] = {
+        "us per target": round(timed_blocks(Neighbourhood(radii=radii)))
+    }
     if args.targets:
         points, values, _, places = problem(args.targets)
         start = time.perf_counter()

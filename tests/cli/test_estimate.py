@@ -95,6 +95,36 @@ def test_the_variogram_goes_out_and_in_as_a_file(files, tmp_path: Path, capsys) 
     assert "inverse_distance has no variogram" in capsys.readouterr().err
 
 
+def test_blocks_and_methods_side_by_side(files, tmp_path: Path, capsys) -> None:
+    out, summary = tmp_path / "out.csv", tmp_path / "s.json"
+    how = ("--variogram", files["v.json"], "--block-size", "8,8,4", "--discretise", "2,2,2")
+    more = ("--also", "all", "--cross-validate", "--summary", str(summary), "--quiet")
+    limits = ("--max-per-octant", "4", "--min-holes", "2", "--min-octants", "2")
+    assert main(words(files, out, *how, *more, *limits)) == 0
+    got = pd.read_csv(out)
+    new = [name for name in got if name.startswith("CU_")]
+    assert new == [
+        *("CU_estimate", "CU_variance", "CU_efficiency", "CU_slope"),
+        *("CU_simple", "CU_inverse_distance", "CU_nearest", "CU_samples", "CU_flag"),
+    ]
+    assert got.CU_efficiency.max() <= 1
+    told = json.loads(summary.read_text(encoding="utf-8"))
+    assert told["support"] == {"block_size": [8.0, 8.0, 4.0], "discretised": [2, 2, 2]}
+    assert told["neighbourhood"]["min_octants"] == 2
+    # The nearest sample is the worst of the estimators: its error has that sample's too.
+    errors = told["cross_validation"]
+    assert errors["nearest"]["rmse"] > errors["rmse"]
+    capsys.readouterr()
+    for more, said in (
+        (("--discretise", "2,2,2"), "--discretise needs --block-size"),
+        (("--block-size", "8,8,4", "--discretise", "2,2"), "three numbers such as 3,3,3"),
+        (("--block-size", "8,8,0"), "block_size must have sides above 0"),
+        (("--also", "kriging"), "--also takes other methods than --method"),
+    ):
+        assert main(words(files, tmp_path / "no.csv", "--quiet", *more)) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_few_samples_are_flagged_and_told(files, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out.csv"
     more = ("--variogram", files["v.json"], "--radii", "3,3,3", "--json")

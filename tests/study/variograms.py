@@ -3,11 +3,12 @@
     python tests/study/variograms.py [--sets 50] [--first 0] [-o data/variograms.csv]
 
 A set is a simulated body, drilled, and a random field of known covariance: stationary in the true
-flat space of the body, or in the folded one. Bodies, kinds, ranges (60 to 200 m along, one or two in
-the layer, 12 to 40 m across), nugget (0, 30, 60 %), spacing (30, 45, 60 m) and distribution
-(normal, lognormal) change from set to set. Blocks drawn from the body are kriged with the model of each way
-of fitting, and with the true covariance: 24 nearest samples, no more than 6 of a hole. The truth of
-a block has no nugget. A row's share is the RMSE with the true covariance over that with the fit.
+flat space of the body, or in the folded one. From set to set change the body, the kind, the ranges
+(60 to 200 m along, one or two in the layer, 12 to 40 m across), the nugget (0, 30, 60 %), the
+spacing (40, 50, 60 m) and the distribution (normal, lognormal). Blocks drawn from the body are
+kriged with the model of each way of fitting, and with the true covariance: 24 nearest samples, no
+more than 6 of a hole. The truth of a block has no nugget. A row's share is the RMSE with the true
+covariance over that with the fit.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ from geounfold.synthetic import PATTERNS, GradeField, drill
 BODIES = ("steep", "sim_case_2", "plunging", "box", "swelling", "recumbent")
 KINDS = ("spherical", "exponential", "gaussian")
 NUGGETS = (0.0, 0.3, 0.6)
-SPACINGS = (60, 45, 30)
+SPACINGS = (60, 50, 40)
 SPACES = ("unfolded", "folded")
 WAYS = {
     "likelihood": {},
     "near lags": {"weights": "near", "scores": True},
     "cressie": {"weights": "cressie", "scores": True},
 }
-TARGETS, COMPOSITE = 500, 4.0
+TARGETS, COMPOSITE = 500, 6.0
 NEAREST, PER_HOLE = 24, 6
 SPREAD = 0.8  # deviation of the logarithms of lognormal grades
 OUTPUT = Path("data/variograms.csv")

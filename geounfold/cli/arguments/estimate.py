@@ -16,8 +16,11 @@ from geounfold.cli.arguments.texts import POINT_FORMATS, POINTS, WHERE, joined
 
 _RESULTS = """\
 results, for a grade CU:
-  CU_estimate      at the block's centroid, as a point; empty if there is none
+  CU_estimate      at the block's centroid, as a point, or the block's mean with
+                   --block-size; empty if there is none
   CU_variance      kriging variance, in the grade's unit squared
+  CU_efficiency, CU_slope   with --block-size: kriging efficiency, and slope of
+                   the regression of true on estimated grades
   CU_samples       number of samples used
   CU_flag          estimated, too_few_samples, outside_map, outside_body or
                    unsolvable
@@ -77,7 +80,22 @@ def add_estimate(commands: Any) -> Parser:
         "--method",
         metavar="M",
         default="ordinary",
-        help="ordinary (default) or simple kriging, or inverse_distance",
+        help="ordinary (default) or simple kriging, inverse_distance or nearest",
+    )
+    group.add(
+        "--also",
+        metavar="M,M",
+        help="other methods side by side, a column each, or all: CU_simple ...",
+    )
+    group.add(
+        "--block-size",
+        metavar="X,Y,Z",
+        help="krige means of blocks of these sides (default: points)",
+    )
+    group.add(
+        "--discretise",
+        metavar="N,N,N",
+        help="points along the sides of a block (default 3,3,3)",
     )
     group.add(
         "--variogram",
@@ -131,3 +149,6 @@ def _add_search(parser: Parser) -> None:
     group.add("--min-samples", metavar="N", help="fewest samples of an estimate (default 4)")
     group.add("--max-samples", metavar="N", help="most samples of an estimate (default 24)")
     group.add("--max-per-hole", metavar="N", help="most samples of one hole (default: no limit)")
+    group.add("--max-per-octant", metavar="N", help="most samples of one octant of the search")
+    group.add("--min-holes", metavar="N", help="fewest holes of an estimate (default 1)")
+    group.add("--min-octants", metavar="N", help="fewest octants with samples (default 1)")

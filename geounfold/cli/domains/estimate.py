@@ -121,17 +121,16 @@ def _parts(
     if blocks.count > len(maps):  # points that no map reaches
         place[len(maps)] = len(makes)
         count = int(np.count_nonzero(blocks.part == len(maps)))
+        known = {
+            f"{args.grade}_samples": np.zeros(count, dtype=np.int64),
+            f"{args.grade}_flag": np.full(count, "outside_map"),
+            "location": np.full(count, "outside"),
+        }
+        names = next(iter(results.values())).columns
         empty = np.full(count, np.nan)
         makes.append(
-            sliced({
-                maps.column: np.full(count, ""),
-                f"{args.grade}_estimate": empty,
-                f"{args.grade}_variance": empty,
-                f"{args.grade}_samples": np.zeros(count, dtype=np.int64),
-                f"{args.grade}_flag": np.full(count, "outside_map"),
-                "location": np.full(count, "outside"),
-            })
-        )  # fmt: skip
+            sliced({maps.column: np.full(count, ""), **{n: known.get(n, empty) for n in names}})
+        )
     part = np.where(blocks.part >= 0, place[np.maximum(blocks.part, -1)], blocks.part)
     return PartedTable(blocks.table, part, len(makes)), makes
 

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from geounfold.io import PointTable
     from geounfold.mapping.mesh_map import UnfoldingMap
 
-_WHOLE = ("min_samples", "max_samples", "max_per_hole")
+_WHOLE = (
+    *("min_samples", "max_samples", "max_per_hole"),
+    *("max_per_octant", "min_holes", "min_octants"),
+)
 
 
 def estimation(
@@ -49,6 +52,9 @@ def estimation(
     if soft < 0:
         raise OptionError(f"--soft-boundary needs 0 or more blocks, not '{args.soft_boundary}'")
     cells = _cells(args.decluster)
+    size = None if args.block_size is None else three_numbers(args.block_size, "--block-size")
+    parts = _discretise(args)
+    also = _also(args)
     variogram = None if args.variogram is None else _variogram(args.variogram)
     off = None if args.position_error is None else _position_error(args.position_error)
     from geounfold.estimation import estimate
@@ -59,6 +65,7 @@ def estimation(
         grade=args.grade, method=args.method, neighbourhood=near,
         mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
         soft_boundary=soft, all_blocks=args.all_blocks, position_error=off,
+        block_size=size, discretise=parts, also=also,
     )  # fmt: skip
 
 
@@ -74,6 +81,10 @@ def summarised(args: Namespace, result: Estimation, stage: Callable[[str], None]
             **asdict(score(result.samples.grades, found.estimate)),
             "flags": found.counts(),
         }
+        for method in result.others:
+            stage(f"cross-validating {method}")
+            other = result.cross_validation(method)
+            out["cross_validation"][method] = asdict(score(result.samples.grades, other.estimate))
     return out
 
 
@@ -91,6 +102,39 @@ def sample_table(samples: PointTable, args: Namespace) -> pd.DataFrame:
     table = pd.DataFrame({**columns, args.grade: grade.to_numpy(dtype=object)})
     table.attrs["source"] = samples.source
     return table
+
+
+def _discretise(args: Namespace) -> tuple[int, int, int]:
+    """Return the points along each side of --discretise."""
+    if args.discretise is None:
+        return 3, 3, 3
+    if args.block_size is None:
+        raise OptionError("--discretise needs --block-size X,Y,Z: without it points are estimated")
+    words = args.discretise.split(",")
+    if len(words) != 3:
+        raise OptionError(
+            f"--discretise needs three numbers such as 3,3,3, not '{args.discretise}'"
+        )
+    a, b, c = (whole_number(word.strip(), "--discretise") for word in words)
+    return a, b, c
+
+
+def _also(args: Namespace) -> list[Any]:
+    """Return the methods of --also."""
+    from geounfold.estimation import METHODS
+
+    if args.also is None:
+        return []
+    if args.also == "all":
+        return [method for method in METHODS if method != args.method]
+    words = [word.strip() for word in args.also.split(",")]
+    for word in words:
+        if word not in METHODS or word == args.method:
+            raise OptionError(
+                f"--also takes other methods than --method: {', '.join(METHODS)}, or all; "
+                f"not '{word}'"
+            )
+    return words
 
 
 def _cells(text: str | None) -> tuple[float, float, float] | str | None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from geounfold.errors import InputError, OptionError, check_number, check_numbers
+from geounfold.errors import InputError, OptionError, check_number
 from geounfold.estimation.declustering import Declustering, decluster
 from geounfold.estimation.fit import FittedVariogram, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples, in_body
@@ -26,7 +26,7 @@ from geounfold.estimation.kriging import (
 from geounfold.estimation.neighbourhood import LIMITS, Neighbourhood, least_factor
 from geounfold.estimation.position_error import with_position_error
 from geounfold.estimation.scores import Conservation, conservation
-from geounfold.estimation.systems import discretised, local_axes
+from geounfold.estimation.support import BlockSupport, discretised
 from geounfold.estimation.variogram import Triple, Variogram
 from geounfold.geometry.mesh import Floats
 from geounfold.io.grade_values import GradeRules, grade_rules
@@ -221,47 +221,6 @@ class Estimation:
             "regression_slope": _mean(self.blocks.slope),
             "warnings": self.warnings(),
         }
-
-
-@dataclass(frozen=True, eq=False)
-class BlockSupport:
-    """Blocks that are estimated as means of points inside them, carried to the unfolded space.
-
-    Attributes
-    ----------
-    sizes : (float, float, float)
-        Sides along the folded x, y and z.
-    numbers : (int, int, int)
-        Points along each side.
-    axes : (m, 3, 3) float
-        Images of the folded axes at each block (`systems.local_axes`).
-    plain : int
-        Number of blocks that keep the folded axes along one axis at least.
-    """
-
-    sizes: Triple
-    numbers: tuple[int, int, int]
-    axes: Floats
-    plain: int
-
-    @classmethod
-    def of(cls, carrier: Any, centres: Floats, sizes: Any, numbers: Any) -> BlockSupport:
-        """Return the support of blocks with their centroids, (m, 3), in the folded space.
-
-        Raises
-        ------
-        OptionError
-            A side is not above 0, or a number of points is not a whole number of 1 or more.
-        """
-        check_numbers("block_size", sizes, 3)
-        a, b, c = (float(side) for side in sizes)
-        if min(a, b, c) <= 0:
-            raise OptionError(f"block_size must have sides above 0, not {a:g}, {b:g}, {c:g}")
-        count = tuple(numbers)
-        if len(count) != 3 or not all(isinstance(n, int) and 1 <= n <= 20 for n in count):
-            raise OptionError(f"discretise must be three whole numbers from 1 to 20, not {numbers}")
-        axes, plain = local_axes(carrier, centres, np.array([a, b, c]))
-        return cls((a, b, c), (count[0], count[1], count[2]), axes, plain)
 
 
 def _mean(values: Floats | None) -> float | None:

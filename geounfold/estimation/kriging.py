@@ -163,7 +163,7 @@ def krige(  # 12 arguments: the samples, the targets, and seven choices by keywo
         Number of processes at a time. Above 131,072 targets other processes are used in any case.
     blocks : ((q, 3) float, (m, 3, 3) float), optional
         Block support for kriging: the points that each target is the mean of, from its centre
-        (`systems.discretised`), and the images of the axes at each target (`systems.local_axes`).
+        (`support.discretised`), and the images of the axes at each target (`support.local_axes`).
         The answer then has efficiencies and slopes.
 
     Returns

@@ -16,7 +16,7 @@ import numpy as np
 
 from geounfold.backends import gstlearn
 from geounfold.estimation import Neighbourhood, Structure, Variogram, krige
-from geounfold.estimation.systems import discretised
+from geounfold.estimation.support import discretised
 
 MODEL = Variogram(0.1, (Structure("spherical", 0.9, (200, 200, 20)),))
 CALLED = (

@@ -11,7 +11,8 @@ import geounfold as gu
 from geounfold.errors import OptionError
 from geounfold.estimation import Neighbourhood, Structure, Variogram, estimate, krige
 from geounfold.estimation.neighbourhood import Search
-from geounfold.estimation.systems import discretised, local_axes, solve_systems
+from geounfold.estimation.support import discretised, local_axes
+from geounfold.estimation.systems import solve_systems
 from geounfold.synthetic import GradeField, drill
 
 pytest.importorskip("gstlearn", reason="the extra geostat is not installed")

@@ -75,6 +75,13 @@ def add_estimate(commands: Any) -> Parser:
         action="store_true",
         help="in the summary: errors at samples that their own hole does not estimate",
     )
+    _add_method(parser)
+    _add_search(parser)
+    return parser
+
+
+def _add_method(parser: Parser) -> None:
+    """Add the options of the method."""
     group = parser.section("method")
     group.add(
         "--method",
@@ -117,8 +124,6 @@ def add_estimate(commands: Any) -> Parser:
     group.add("--mean", metavar="X", help="mean for simple kriging (default: that of SAMPLES)")
     group.add("--power", metavar="X", default="2", help="power of inverse distance (default 2)")
     group.add("--workers", metavar="N", default="1", help="number of processes (default 1)")
-    _add_search(parser)
-    return parser
 
 
 def _add_search(parser: Parser) -> None:

@@ -44,7 +44,12 @@ class OccupiedCells:
     def of(cls, cells: Ints) -> OccupiedCells:
         """Return the distinct ones of cells (n, 3)."""
         box = cls._box(cells)
-        return cls(sorted_distinct(box.keys_of(cells)), box.low, box.shape)
+        every = box.keys_of(cells)
+        if box.size > _DENSE * len(every):
+            return cls(sorted_distinct(every), box.low, box.shape)
+        taken = np.zeros(int(box.size), dtype=bool)
+        taken[every] = True
+        return cls(np.flatnonzero(taken), box.low, box.shape)
 
     @classmethod
     def numbered(cls, cells: Ints) -> tuple[OccupiedCells, Ints]:

@@ -94,7 +94,7 @@ class Carried:
         out.element[rows] = -1
         return out
 
-    def part(self, rows: slice) -> Carried:
+    def part(self, rows: slice | Ints) -> Carried:
         """Return the results of some of the points."""
         return Carried(
             self.points[rows],

@@ -94,7 +94,7 @@ def lattice_nmd(
     if float(np.prod(shape.astype(float))) > 2.0**62:
         return None
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = (cells - low) @ stride
+    keys = sum(c * step for c, step in zip((cells - low).T, stride.tolist(), strict=True))
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     if (keys[1:] == keys[:-1]).any():

@@ -19,6 +19,7 @@ from geounfold.mapping.control_mesh import ControlMesh, scaled
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.methods import BodyFit, PointwiseMap
 from geounfold.methods.contract import Stage
+from geounfold.methods.sheet.sharpening.lattice_sites import scatter
 from geounfold.quality.blocks import Quality, assess, assess_points
 from geounfold.quality.torn_blocks import SUSPECT, torn_blocks
 from geounfold.quality.trust import Signs, Trust, judge, measure_signs
@@ -31,6 +32,9 @@ from geounfold.unfolding.checks import (
     check_trust,
 )
 from geounfold.unfolding.options import UnfoldOptions
+
+_RETURNED = 250_000
+"""Number of points above which a part of about so many is carried to the flat space and back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,7 @@ def measure(
     P, frame = prepared.points, prepared.frame
     with stage("map"):
         carried = mapping.carry(P)
-        returned = mapping.returned(P, carried)
+        returned = _returned(mapping, P, carried)
     with stage("certificate"):
         certificate = _certificate(mapping, carried, frame)
     check_certified(certificate, options)
@@ -92,7 +96,7 @@ def measure(
         torn = _torn(prepared.groups, prepared.work, carried, quality, frame)
         if 0 < len(torn) <= few(len(P)):
             carried, torn = carried.without(torn), torn[:0]
-            returned = mapping.returned(P, carried)
+            returned = _returned(mapping, P, carried)
             quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
     check_coordinates(quality, returned, P, options)
     check_torn(torn, P, options)
@@ -103,6 +107,23 @@ def measure(
         trust = with_spread_reason(trust, uncertainty, frame.scale)
     check_trust(trust, options)
     return Measured(carried, returned, certificate, quality, torn, trust)
+
+
+def _returned(
+    mapping: UnfoldingMap | PointwiseMap, points: Floats, carried: Carried
+) -> Returned | None:
+    """Return the round trip of the points.
+
+    Tetrahedra bring every point back, to rounding. So of many points a part is brought back that is
+    spread over all of them, whatever the order of the rows.
+    """
+    if isinstance(mapping, PointwiseMap) or mapping.prisms is not None or len(points) <= _RETURNED:
+        return mapping.returned(points, carried)
+    some = np.flatnonzero(scatter(points) < _RETURNED / len(points))
+    found = mapping.returned(points[some], carried.part(some))
+    lost = np.zeros(len(points), dtype=bool)
+    lost[some] = found.lost
+    return replace(found, lost=lost)
 
 
 def in_world(control: ControlMesh, frame: Frame) -> ControlMesh:

@@ -32,9 +32,10 @@ class Exploration:
     layers : DataFrame
         Statistics by layer from the bottom up, as `by_layer` returns them.
     variograms : dict of DataFrame
-        Experimental variograms by space (folded, unfolded), as `directional` returns them.
+        Experimental variograms by space (folded, unfolded) along the axes of the models, as
+        `directional` returns them.
     models : dict of FittedVariogram
-        Models fitted in each space, with one range along the layer and one across it.
+        Models fitted in each space (`fit_variogram`).
     swaths : dict of DataFrame
         Means along x, y and the stratigraphic coordinate, as `swath` returns them.
     contacts : dict of DataFrame
@@ -115,16 +116,18 @@ def explore(
     flat = flat_samples(carrier, samples, grade=grade, hole=hole, rules=grade_rules(values))
     s, v = flat.stratigraphic, flat.grades
     places = {"x": flat.points[:, 0], "y": flat.points[:, 1], "stratigraphic": s}
+    places_of = {"folded": flat.folded, "unfolded": flat.points}
+    models = {space: fit_variogram(P, v, holes=flat.holes) for space, P in places_of.items()}
     return Exploration(
         grade=grade,
         samples=flat,
         histogram=histogram(v, bins),
         layers=by_layer(s, v, layers),
-        variograms={"folded": directional(flat.folded, v), "unfolded": directional(flat.points, v)},
-        models={
-            "folded": fit_variogram(flat.folded, v, holes=flat.holes),
-            "unfolded": fit_variogram(flat.points, v, holes=flat.holes),
+        variograms={
+            space: directional(P, v, rotation=models[space].model.rotation)
+            for space, P in places_of.items()
         },
+        models=models,
         swaths={name: swath(place, v, bins) for name, place in places.items()},
         contacts={"bottom": contact(s, v, 0.05), "top": contact(1 - s, v, 0.05)},
     )
@@ -199,12 +202,18 @@ def swath(place: Floats, values: Floats, bins: int = 30) -> pd.DataFrame:
         Number of slices of equal width.
     """
     place = np.asarray(place, dtype=np.float64)
-    v = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(place) & np.isfinite(np.asarray(values, dtype=np.float64))
+    _known(np.asarray(values, dtype=np.float64)[good])
+    edges = np.linspace(float(place[good].min()), float(place[good].max()), bins + 1)
+    return swath_between(place, values, edges)
+
+
+def swath_between(place: Floats, values: Floats, edges: Floats) -> pd.DataFrame:
+    """Return mean values in the slices between edges, with the columns of `swath`."""
+    place, v = np.asarray(place, dtype=np.float64), np.asarray(values, dtype=np.float64)
     good = np.isfinite(place) & np.isfinite(v)
-    place, v = place[good], _known(v[good])
-    edges = np.linspace(float(place.min()), float(place.max()), bins + 1)
-    index = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, bins - 1)
-    return _binned(index, v, edges)
+    index = np.clip(np.searchsorted(edges, place[good], side="right") - 1, 0, len(edges) - 2)
+    return _binned(index, v[good], edges)
 
 
 def contact(

@@ -32,26 +32,26 @@ def exploration_html(exploration: Exploration) -> str:
     from geounfold.report.plots.grades import charts
 
     told = _told(exploration)
-    drawn = {name: _drawn(figure, told[name]) for name, figure in charts(exploration).items()}
+    pictures = {name: drawn(figure, told[name]) for name, figure in charts(exploration).items()}
     layers = exploration.layers
     parts = [
         f'<p class="soft">{text(_samples(exploration))}</p>',
         "<h3>Histogram and statistics</h3>",
-        drawn["histogram"],
+        pictures["histogram"],
         table([_row(statistics(exploration.samples.grades), _STATISTICS)]),
         "<h3>By layer</h3>",
-        drawn["layers"],
+        pictures["layers"],
         table([_row(r, _BY_LAYER) for r in layers.to_dict("records")]),
         "<h3>Variograms in both spaces</h3>",
         '<p class="soft">Along is the horizontal plane and across the vertical, of either space: '
         "only in the unfolded one these are the layers' own. Lines are the fitted models, points "
         "larger the more pairs they have; distances are in the blocks' unit.</p>",
-        drawn["variograms"],
+        pictures["variograms"],
         table([_model(space, fitted) for space, fitted in exploration.models.items()]),
         "<h3>Swaths along the unfolded axes</h3>",
-        drawn["swaths"],
+        pictures["swaths"],
         "<h3>Contacts</h3>",
-        drawn["contacts"],
+        pictures["contacts"],
     ]
     return "\n".join(parts)
 
@@ -136,7 +136,8 @@ def _model(space: str, fitted: FittedVariogram) -> dict[str, Any]:
     }
 
 
-def _drawn(figure: Figure, caption: str) -> str:
+def drawn(figure: Figure, caption: str) -> str:
+    """Return a figure with its caption as HTML."""
     from geounfold.report.plots.figures import svg
 
     data, words = base64.b64encode(svg(figure)).decode("ascii"), text(caption)

@@ -28,6 +28,7 @@ from geounfold.report.sections import (
     crosscheck_section,
     distributions_section,
     drillholes_section,
+    estimation_section,
     everything_section,
     exploration_section,
     figures_section,
@@ -46,6 +47,7 @@ from geounfold.report.without_folders import without_folders
 
 if TYPE_CHECKING:
     from geounfold.estimation import Exploration
+    from geounfold.estimation.checks import EstimationChecks
 
 _SCRIPTS = ("decode", "colour", "camera", "renderer", "view", "inspect", "controls", "main")
 
@@ -61,6 +63,7 @@ def write_report(  # 11 arguments: the file, the body, and by keyword what was c
     faults: CarriedFaults | None = None,
     horizons: Horizons | None = None,
     exploration: Exploration | None = None,
+    estimation: EstimationChecks | None = None,
     view: ViewOptions | None = None,
     start: str = "",
 ) -> None:
@@ -70,7 +73,9 @@ def write_report(  # 11 arguments: the file, the body, and by keyword what was c
     ----------
     path : path
         The file to write; an existing one is replaced.
-    summary, folded, unfolded, columns, holes, faults, horizons, exploration, view, start
+    summary, folded, unfolded, columns, holes, faults, horizons, exploration, estimation, view
+        As for `report_html`.
+    start : str
         As for `report_html`.
 
     Raises
@@ -84,6 +89,7 @@ def write_report(  # 11 arguments: the file, the body, and by keyword what was c
         faults=faults,
         horizons=horizons,
         exploration=exploration,
+        estimation=estimation,
         view=view,
         start=start,
     )
@@ -100,6 +106,7 @@ def report_html(  # as write_report, without the file
     faults: CarriedFaults | None = None,
     horizons: Horizons | None = None,
     exploration: Exploration | None = None,
+    estimation: EstimationChecks | None = None,
     view: ViewOptions | None = None,
     start: str = "",
 ) -> str:
@@ -126,6 +133,8 @@ def report_html(  # as write_report, without the file
         Top and bottom surfaces in both spaces, by these names.
     exploration : Exploration, optional
         Exploratory data analysis of a grade of the samples carried with the body.
+    estimation : EstimationChecks, optional
+        Checks of an estimation on the blocks.
     view : ViewOptions, optional
         Direction from which bodies are viewed.
     start : str, optional
@@ -146,12 +155,13 @@ def report_html(  # as write_report, without the file
     if start:
         viewer.content["start"] = start
     script = _script()
+    carried = _Carried(holes, faults, exploration, estimation)
     return Template(asset("page.html")).substitute(
         title=text(_title(summary, body.total)),
         digest=_digest(script),
         style=asset("style.css"),
         about=f"{body.total:,} blocks, geounfold {text(summary.get('version', ''))}",
-        body=_sections(summary, body, viewer.notes, _Carried(holes, faults, exploration), view),
+        body=_sections(summary, body, viewer.notes, carried, view),
         data=json_for_script(viewer.content),
         script=script,
     )
@@ -164,6 +174,7 @@ class _Carried:
     holes: CarriedHoles | None
     faults: CarriedFaults | None
     exploration: Exploration | None
+    estimation: EstimationChecks | None = None
 
 
 def _sections(
@@ -186,6 +197,7 @@ def _sections(
         figures_section(summary),
         distributions_section(body.results),
         exploration_section(carried.exploration),
+        estimation_section(carried.estimation),
         flaws_section(summary),
         crosscheck_section(summary),
         '<div class="duo">',

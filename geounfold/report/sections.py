@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from geounfold.geometry.mesh import Floats
 from geounfold.report.charts import distribution
 from geounfold.report.columns import DISTRIBUTED, MEANINGS
+from geounfold.report.estimation import estimation_html
 from geounfold.report.exploration import exploration_html
 from geounfold.report.html_text import (
     bars,
@@ -33,6 +34,7 @@ from geounfold.report.verdict import Verdict
 
 if TYPE_CHECKING:
     from geounfold.estimation import Exploration
+    from geounfold.estimation.checks import EstimationChecks
 
 
 @cache
@@ -119,6 +121,13 @@ def distributions_section(results: Mapping[str, Floats]) -> str:
             charts = distribution(results[name], label)
             parts.append(f'<h3>{text(name)}</h3><p class="soft">{text(meaning)}</p>{charts}')
     return section("Distributions over the blocks", "\n".join(parts))
+
+
+def estimation_section(checks: EstimationChecks | None) -> str:
+    """Return the checks of an estimation: settings, variograms, swaths, grade and tonnage."""
+    if checks is None:
+        return ""
+    return section(f"Estimation of {checks.grade}", estimation_html(checks))
 
 
 def exploration_section(exploration: Exploration | None) -> str:

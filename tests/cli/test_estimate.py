@@ -125,6 +125,18 @@ def test_blocks_and_methods_side_by_side(files, tmp_path: Path, capsys) -> None:
         assert said in capsys.readouterr().err
 
 
+def test_the_report_has_curves_swaths_tonnage_and_settings(files, tmp_path: Path) -> None:
+    out, page = tmp_path / "out.csv", tmp_path / "r.html"
+    how = ("--variogram", files["v.json"], "--decluster", "auto", "--quiet")
+    assert main(words(files, out, "--report", str(page), *how)) == 0
+    told = page.read_text(encoding="utf-8")
+    for title in ("Estimation of CU", "Settings and figures of the run", "Variograms", "Swaths"):
+        assert title in told
+    for item in ("search radii", "structure 1", "declustered mean of samples", "fewest holes"):
+        assert f"<td>{item}" in told
+    assert told.count('<figure class="drawn">') >= 3
+
+
 def test_few_samples_are_flagged_and_told(files, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out.csv"
     more = ("--variogram", files["v.json"], "--radii", "3,3,3", "--json")

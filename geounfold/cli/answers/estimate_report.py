@@ -41,6 +41,7 @@ def write_estimate_report(
     blocks, samples : tables
         As they were read.
     """
+    from geounfold.estimation.checks import estimation_checks
     from geounfold.report import CarriedHoles, CarriedPoints, write_report
 
     carried = saved.carry(samples.points)
@@ -52,7 +53,7 @@ def write_estimate_report(
     columns: dict[str, Any] = {
         name: np.where(np.isfinite(values), values, np.nan)
         for name, values in result.columns.items()
-        if name in (estimate, variance)
+        if name in (estimate, variance) or name.endswith(("_efficiency", "_slope"))
     }
     columns |= {
         name: values
@@ -66,6 +67,7 @@ def write_estimate_report(
         result.carried.points,
         columns,
         holes=CarriedHoles(samples=CarriedPoints(hole, samples.points, carried.points, known)),
+        estimation=estimation_checks(result, summary),
         start=estimate,
     )
 

@@ -6,7 +6,7 @@ Every ``chart_`` function returns a matplotlib Figure that belongs to no window.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from geounfold.estimation import Exploration, FittedVariogram
+    from geounfold.estimation import Exploration, FittedVariogram, Variogram
 
 # Okabe and Ito's colours, which colour-blind readers can distinguish.
 ALONG, ACROSS, BARS, MEAN = "#0072B2", "#E69F00", "#999999", "#D55E00"
+SECOND = "#009E73"
 
 _CURVE = 100  # points of a model's curve
 
@@ -70,33 +71,72 @@ def chart_layers(table: pd.DataFrame, grade: str) -> Figure:
 
 
 def chart_variograms(
-    tables: Mapping[str, pd.DataFrame], models: Mapping[str, FittedVariogram]
+    tables: Mapping[str, pd.DataFrame], models: Mapping[str, FittedVariogram | Variogram]
 ) -> Figure:
     """Draw experimental variograms along and across with their models, a panel for each space.
+
+    Models with two ranges in the plane have a curve along either axis.
 
     Parameters
     ----------
     tables : mapping of DataFrame
-        Results of `estimation.directional`, by space.
-    models : mapping of FittedVariogram
-        Fitted models, by space.
+        Results of `estimation.directional`, by space, along the models' axes.
+    models : mapping of FittedVariogram or Variogram
+        Models, by space.
     """
     figure, panels = _figure(len(tables), (4.4 * len(tables), 3.6))
     for axes, (space, table) in zip(panels, tables.items(), strict=True):
-        for name, colour, unit in (("along", ALONG, (1, 0, 0)), ("across", ACROSS, (0, 0, 1))):
+        found = models.get(space)
+        model: Any = getattr(found, "model", found)  # a fitted one holds its model
+        level = [("along", ALONG, (1, 0, 0))]
+        if model is not None and model.ranges[0] != model.ranges[1]:
+            level = [("axis_1", ALONG, (1, 0, 0)), ("axis_2", SECOND, (0, 1, 0))]
+        for name, colour, unit in (*level, ("across", ACROSS, (0, 0, 1))):
             part = table[table["direction"] == name]
             if not len(part):
                 continue
             size = 5 + 40 * part["pairs"] / part["pairs"].max()
-            axes.scatter(part["distance"], part["gamma"], size, color=colour, label=name)
-            fitted = models.get(space)
-            if fitted is not None:
+            label = name.replace("_", " ")
+            axes.scatter(part["distance"], part["gamma"], size, color=colour, label=label)
+            if model is not None:
                 h = np.linspace(0, float(part["distance"].max()), _CURVE)[1:]
-                way = fitted.model.axes.T @ np.asarray(unit, dtype=np.float64)
-                axes.plot(h, fitted.model.gamma(h[:, None] * way), color=colour)
+                way = model.axes.T @ np.asarray(unit, dtype=np.float64)
+                axes.plot(h, model.gamma(h[:, None] * way), color=colour)
         axes.set(title=space, xlabel="distance", ylabel="semivariance", xlim=(0, None))
         axes.set_ylim(0, None)
         axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def chart_beside(tables: Mapping[str, pd.DataFrame], grade: str) -> Figure:
+    """Draw mean grades of blocks and samples in the same slices, a panel for each axis."""
+    figure, panels = _figure(len(tables), (3.8 * len(tables), 3.4))
+    for axes, (name, table) in zip(panels, tables.items(), strict=True):
+        low, high = table["low"].to_numpy(), table["high"].to_numpy()
+        count = table["count_samples"].to_numpy()
+        right = axes.twinx()
+        right.bar(low, count, width=high - low, align="edge", color=BARS, alpha=0.35)
+        right.set(ylabel="samples", ylim=(0, 3 * max(int(count.max()), 1)))
+        middle = 0.5 * (low + high)
+        axes.plot(middle, table["mean_samples"], "o", color=MEAN, markersize=4, label="samples")
+        axes.plot(middle, table["mean_blocks"], "-", color=ALONG, label="blocks")
+        axes.set(xlabel=name, ylabel=f"mean {_plain(grade)}")
+        axes.legend(frameon=False, fontsize="small")
+        axes.set_zorder(right.get_zorder() + 1)
+        axes.patch.set_visible(False)
+    return figure
+
+
+def chart_tonnage(table: pd.DataFrame, grade: str) -> Figure:
+    """Draw tonnage and mean grade above cut-offs, of blocks and of samples."""
+    figure, (left, right) = _figure(2, (8.4, 3.4))
+    for axes, name in ((left, "tonnage"), (right, "grade")):
+        axes.plot(table["cutoff"], table[f"{name}_blocks"], "-", color=ALONG, label="blocks")
+        axes.plot(table["cutoff"], table[f"{name}_samples"], "--", color=MEAN, label="samples")
+        axes.set_xlabel(f"cut-off {_plain(grade)}")
+        axes.legend(frameon=False, fontsize="small")
+    left.set(ylabel="share above the cut-off", ylim=(0, 1.02))
+    right.set_ylabel(f"mean {_plain(grade)} above it")
     return figure
 
 

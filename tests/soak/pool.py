@@ -6,7 +6,6 @@ import argparse
 import csv
 import multiprocessing as mp
 import os
-import resource
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -14,6 +13,11 @@ from dataclasses import asdict, dataclass, field, fields
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
+
+try:
+    import resource as limits
+except ImportError:  # Windows: --memory has no effect there
+    limits = None
 
 
 @dataclass
@@ -48,7 +52,7 @@ def started(work: Callable[[Any], None], row: Any, memory: int) -> Job:
     memory : int
         Limit in MiB; 0 for none.
     """
-    context = mp.get_context("fork")
+    context = mp.get_context("fork" if hasattr(os, "fork") else "spawn")
     mine, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_worker, args=(theirs, work, row, memory))
     process.start()
@@ -58,8 +62,8 @@ def started(work: Callable[[Any], None], row: Any, memory: int) -> Job:
 
 def _worker(pipe: Connection, work: Callable[[Any], None], row: Any, memory: int) -> None:
     """Unfold one body under a memory limit, in silence, and send its row."""
-    if memory:
-        resource.setrlimit(resource.RLIMIT_AS, (memory << 20, memory << 20))
+    if memory and limits is not None:
+        limits.setrlimit(limits.RLIMIT_AS, (memory << 20, memory << 20))
     devnull = os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 1)
     os.dup2(devnull, 2)

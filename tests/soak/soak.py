@@ -26,7 +26,6 @@ import argparse
 import csv
 import json
 import os
-import resource
 import sys
 import time
 from collections import Counter
@@ -129,6 +128,7 @@ def failing(row: Row, u: Any) -> tuple[str, str]:
 
 def work(row: Row, options: dict[str, Any]) -> None:
     """Unfold one body and fill in its row, whatever comes of it."""
+    from geounfold.backends.system.memory import peak_memory_mb
     from geounfold.errors import GeounfoldError
 
     try:
@@ -137,7 +137,7 @@ def work(row: Row, options: dict[str, Any]) -> None:
         row.outcome, row.reason, row.message = "refused", type(error).__name__, str(error)
     except Exception as error:
         row.reason, row.message = type(error).__name__, f"{error} ({place_of(error)})"
-    row.peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    row.peak_mib = peak_memory_mb()
 
 
 def stopped(row: Row, how: str, message: str) -> None:

@@ -61,23 +61,47 @@ def lowest_vector(L: sp.csc_array) -> Floats:
 
     A large graph is first contracted along its strongest pulls, so that the factorisation stays
     small; the eigenvector of the contracted graph, constant on each cluster, is then smoothed.
+
+    The signs are what a split needs, and the vector is their relaxation.  If two eigenvalues are
+    close (two limbs that hardly hold on to each other, 2 % apart), the second vector may have the
+    better signs: of the two, the one is returned whose signs break less (see `broken`).
     """
     if L.shape[0] <= COARSE_ABOVE:
-        return _lowest_exact(L)[1]
+        return _less_broken(L, _lowest_exact(L)[1])
     cluster = _clusters(L, COARSENINGS)
     size = np.bincount(cluster)
     scale = 1 / np.sqrt(size)
     coarse = _contract(L, cluster)
-    value, y = _lowest_exact(sp.csc_array(sp.diags_array(scale) @ coarse @ sp.diags_array(scale)))
-    x: Floats = (scale * y)[cluster]
-    diagonal = L.diagonal()
+    scaled = sp.csc_array(sp.diags_array(scale) @ coarse @ sp.diags_array(scale))
+    values, vectors = _lowest_exact(scaled)
+    fine: Floats = (scale[:, None] * vectors)[cluster]
+    diagonal = L.diagonal()[:, None]
     for _ in range(SMOOTHINGS):
-        x = x - 0.6 * (L @ x - value * x) / diagonal
-    return x
+        fine = fine - 0.6 * (L @ fine - values * fine) / diagonal
+    return _less_broken(L, fine)
 
 
-def _lowest_exact(L: sp.csc_array) -> tuple[float, Floats]:
-    """Return the lowest eigenvalue and its eigenvector, by shift-invert Lanczos."""
+def broken(L: sp.csc_array, x: Floats) -> float:
+    """Return the weight of pulls between opposite signs of ``x`` and of pushes between equal ones.
+
+    The lowest eigenvector minimises this sum relaxed to real numbers; signs alone count here.
+    """
+    graph = L.tocoo()
+    once = graph.row < graph.col
+    row, column, value = graph.row[once], graph.col[once], graph.data[once]
+    opposite = (x[row] >= 0) != (x[column] >= 0)
+    return float(np.abs(value[opposite == (value < 0)]).sum())
+
+
+def _less_broken(L: sp.csc_array, vectors: Floats) -> Floats:
+    """Return the column of ``vectors`` (n, k) whose signs break least, the first of equal ones."""
+    costs = [broken(L, x) for x in vectors.T]
+    best: Floats = vectors[:, int(np.argmin(costs))]
+    return best
+
+
+def _lowest_exact(L: sp.csc_array) -> tuple[Floats, Floats]:
+    """Return the two lowest eigenvalues and their eigenvectors (n, 2), by shift-invert Lanczos."""
     n = L.shape[0]
     shifted = sp.csc_array(L + 1e-6 * sp.eye_array(n))
     lu = spl.splu(shifted, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
@@ -85,10 +109,11 @@ def _lowest_exact(L: sp.csc_array) -> tuple[float, Floats]:
     start = np.cos(np.arange(n) * 2.399963)
     options = {"sigma": -1e-6, "which": "LM", "OPinv": solve, "v0": start, "tol": 1e-6}
     try:
-        values, vectors = spl.eigsh(L, k=1, ncv=min(n, 12), **options)
+        values, vectors = spl.eigsh(L, k=min(2, n - 1), ncv=min(n, 12), **options)
     except spl.ArpackNoConvergence as error:
         raise SplitError("the signed split did not converge; try split 'normal'") from error
-    return float(values[0]), vectors[:, 0]
+    order = np.argsort(values, kind="stable")
+    return values[order], vectors[:, order]
 
 
 def _clusters(L: sp.csc_array, rounds: int) -> Ints:

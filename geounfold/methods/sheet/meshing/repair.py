@@ -6,6 +6,7 @@ and a boundary that does not cross itself.  The first rung without a flaw is tak
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
@@ -26,7 +27,6 @@ from geounfold.methods.sheet.meshing.prism_layers import (
 from geounfold.methods.sheet.meshing.shell import less
 from geounfold.methods.sheet.meshing.tents import with_tents
 
-_BLENDS = 8  # rounds that replace offsets by smaller ones
 _BLEND = 0.6  # largest slope of the offsets where they change from one to the other
 _MOVABLE = 0.03  # largest share of the vertices that is untangled
 _FEW = 0.002  # largest share of the blocks in the shell that is taken into the body
@@ -184,14 +184,16 @@ def _blended(
 ) -> tuple[Columns, Laid | None, Rung]:
     """Return prisms with smaller offsets around the flaws.
 
-    Empty columns there are left out.  None if the prisms are not proved.
+    Empty columns there are left out.  None if a round leaves as many flaws as the one before: of
+    30 calls on field bodies, 11 came to an end in the first round, and the others' flaws stayed
+    from the second or third on.
     """
     mean, n = neighbour_mean(layers.F, len(layers.P)), len(layers.P)
     back = np.zeros(n, dtype=bool)
     low = np.minimum([near.up, near.down], [layers.up, layers.down])
-    laid, step = None, 0
-    while laid is None and step < _BLENDS:
-        step += 1
+    laid, step, fewest = None, 0, math.inf
+    while laid is None and (left := exam.rung("blended").flaws) < fewest:
+        step, fewest = step + 1, left
         touched = np.unique(exam.vertices % n)
         columns = columns.narrowed(touched)
         back[touched] = True

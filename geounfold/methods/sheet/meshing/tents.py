@@ -11,10 +11,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from geounfold.backends.igl import SurfaceIndex, barycentric_in_tets
+from geounfold.backends.igl import (
+    SurfaceIndex,
+    barycentric_in_tets,
+    self_intersections,
+    upright,
+)
 from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.mapping.certificate import Gluing, examine
+from geounfold.mapping.certificate import Gluing
 from geounfold.methods.sheet.meshing.prism_columns import Laid
 
 _TIP = 0.05  # blocks: height of a tent's tip above its block
@@ -39,24 +45,23 @@ def with_tents(laid: Laid, points: Floats) -> tuple[Laid, Ints]:
     (j,) int
         Rows of the points without one.
     """
-    left = np.arange(len(points))
+    left, gluing = np.arange(len(points)), Gluing.of(laid.all_tets)
     for _ in range(_ROUNDS):
         if not len(left) or len(left) > _MOST:
             break
-        more, kept = _raised(laid, points[left])
+        laid, gluing, kept = _raised(laid, gluing, points[left])
         if not kept.any():
             break
-        laid, left = more, left[~kept]
+        left = left[~kept]
     return laid, left
 
 
-def _raised(laid: Laid, points: Floats) -> tuple[Laid, Bools]:
-    """Return the prisms with tents, and which points have one: as many as leave them proved.
+def _raised(laid: Laid, gluing: Gluing, points: Floats) -> tuple[Laid, Gluing, Bools]:
+    """Return the prisms with tents, their gluing, and which points have one.
 
-    If several points lie over one face, the farthest gets the tent; the others may lie inside it.
+    As many points as leave the prisms proved.  If several points lie over one face, the farthest
+    gets the tent; the others may lie inside it.
     """
-    T = laid.all_tets
-    gluing = Gluing.of(T)
     distance, face, foot = SurfaceIndex(laid.folded, gluing.F).closest(points)
     order = np.lexsort((-distance, face))
     first = np.ones(len(order), dtype=bool)
@@ -68,20 +73,56 @@ def _raised(laid: Laid, points: Floats) -> tuple[Laid, Bools]:
         length = np.maximum(distance[chosen], 1e-12)[:, None]
         tips = points[chosen] + _TIP * away / length
         more = _with_tips(laid, tips, gluing, face[chosen])
-        whole = Gluing.of(more.all_tets)
-        flaws = [examine(V, whole) for V in (more.folded, more.unfolded)]
-        bad = [whole.misglued, *(f.elements(whole) for f in flaws)]
-        if not whole.closed:
-            bad.append(np.flatnonzero(np.isin(whole.T, whole.pinched).any(axis=1)))
-        fallen = np.unique(np.concatenate(bad)) - len(T)
-        fallen = fallen[fallen >= 0]
-        if whole.sound and all(f.none for f in flaws):
+        whole = _glued(gluing, face[chosen], more.all_tets)
+        fallen = _flawed(more, whole, len(chosen))
+        if not fallen.any():
             kept[chosen] = True
-            return more, kept
-        if not len(fallen):
-            break
-        chosen = np.delete(chosen, fallen)
-    return laid, kept
+            return more, whole, kept
+        chosen = chosen[~fallen]
+    return laid, gluing, kept
+
+
+def _glued(gluing: Gluing, faces: Ints, T: Ints) -> Gluing:
+    """Return the gluing with tents, the last rows of ``T``, on the border's ``faces`` (k,).
+
+    A tent's base takes the place of the face, and its tip is a new vertex: a closed manifold stays
+    one.
+    """
+    last = len(T) - len(faces)
+    sides = T[last:][:, [[0, 1, 3], [1, 2, 3], [0, 3, 2]]].reshape(-1, 3)
+    return Gluing(
+        T,
+        np.concatenate([np.delete(gluing.F, faces, axis=0), sides]),
+        np.concatenate(
+            [np.delete(gluing.owner, faces), np.repeat(np.arange(last, len(T)), 3)],
+        ),
+        gluing.misglued,
+        gluing.closed,
+    )
+
+
+def _flawed(laid: Laid, gluing: Gluing, count: int) -> Bools:
+    """Return which of the last ``count`` tetrahedra, the tents, are inverted or cross the border.
+
+    Only faces close enough to touch a tent are compared: the others are the proved prisms' own.
+    """
+    tents = gluing.T[-count:]
+    bad = np.zeros(count, dtype=bool)
+    for V in (laid.folded, laid.unfolded):
+        bad |= ~upright(V, tents)
+        middle, radius = _balls(V[tents])
+        centre, size = _balls(V[gluing.F])
+        near = np.flatnonzero(cKDTree(middle).query(centre)[0] <= size + radius.max())
+        owner = gluing.owner[near[self_intersections(V, gluing.F[near])]].ravel()
+        bad[owner[owner >= len(gluing.T) - count] - (len(gluing.T) - count)] = True
+    return bad
+
+
+def _balls(corners: Floats) -> tuple[Floats, Floats]:
+    """Return centre (n, 3) and radius (n,) of a ball that holds each simplex (n, k, 3)."""
+    centre: Floats = corners.mean(axis=1)
+    radius: Floats = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    return centre, radius
 
 
 def _with_tips(laid: Laid, tips: Floats, gluing: Gluing, faces: Ints) -> Laid:

@@ -134,9 +134,11 @@ _LOOKS = 0.7
 
 _FACE = 0.9
 _VERTEX = 1.2
-_TOUCHES = 0.35
+_TOUCHES = 1.0
 """Distances in blocks from a wall: of a face of the hull that looks at it, of a vertex that looks
-at it, and of a vertex whatever it looks at. Measured on 18 designed bodies."""
+at it, and of a vertex whatever it looks at: the hull is round where it meets a wall. Of 12 faulted
+bodies 1.0 in place of 0.35 moves the rms by 0.014 blocks at most; a body with oblique rims that are
+known comes out at 0.16 blocks in place of 0.76."""
 
 _SITES = (8.0, 0.3)
 """Blocks from a wall up to which empty sites are withheld, and blocks on the block's own side."""

@@ -57,6 +57,17 @@ def check_faulted(options: UnfoldOptions, *, given: bool) -> None:
         raise OptionError(no_mesh(options.method, "faults are taken out of control meshes only"))
 
 
+def check_limited(options: UnfoldOptions, *, given: bool) -> None:
+    """Raise OptionError if limits do not go with the method or with given surfaces.
+
+    Parameters as `check_faulted` takes them.
+    """
+    if given:
+        raise OptionError("top and bottom have no rim that limits could tell of: leave out one")
+    if options.method != "sheet":
+        raise OptionError(f"limits are known to the method sheet only, not to {options.method}")
+
+
 def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
     """Raise OptionError if a method without a control mesh is to unfold several bodies."""
     if len(groups) > 1 and not METHODS[options.method].control:

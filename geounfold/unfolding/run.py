@@ -16,10 +16,11 @@ from geounfold.backends.blas import one_thread
 from geounfold.body.fill import FilledSolid
 from geounfold.body.fill.shell_of_bodies import horizons_of_blocks, with_shells
 from geounfold.body.parts.division import Division
-from geounfold.body.prepare import PreparedPoints, prepare
+from geounfold.body.prepare import BodyPoints, PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError
 from geounfold.faults.given import FaultsGiven, Surfaces, block_column
+from geounfold.faults.limits import Limits, limited
 from geounfold.faults.rejoin import Faulting
 from geounfold.geometry.mesh import Bools, Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
@@ -33,7 +34,7 @@ from geounfold.mapping.control_mesh import side_by_side, vertex_parts
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.parts_space import MapParts
 from geounfold.methods import METHODS, BodyFit, PointwiseMap
-from geounfold.unfolding.checks import check_faulted, check_method, check_single
+from geounfold.unfolding.checks import check_faulted, check_limited, check_method, check_single
 from geounfold.unfolding.clock import Clock, Progress
 from geounfold.unfolding.fit_blocks import fit_blocks, fit_untold
 from geounfold.unfolding.fit_body import fit
@@ -75,6 +76,7 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     fault_blocks: Any | None = None,
     slip_direction: Mapping[str, Any] | None = None,
     outline: str = "ore",
+    limits: Any | None = None,
     progress: Progress | None = None,
     where: str | None = None,
     **changes: Any,
@@ -102,6 +104,10 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
     outline : str
         ``ore`` if the rims are the ore's own, whose ends at a fault mark its slip; ``model`` if
         the block model was cut off there.
+    limits : sequence, optional
+        Where the block model was cut off, so that the rim there is no pinch-out: surfaces (file,
+        TriMesh or (V, F)), boxes of six numbers x0, x1, y0, y1, z0, z1 (None where the model goes
+        on), or polygons (k, 2) in plan.  What lies there is withheld from the fit of the layers.
     progress : callable, optional
         Called with every stage's name as it begins.  If it takes two arguments, it also gets the
         share of the run that is done, 0 to 1, and is called inside long stages too.
@@ -151,13 +157,17 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         place = _coordinates(points)
         blocks = block_column(fault_blocks, given, rows)
         found = FaultsGiven.of(faults, blocks, slip_direction, outline, len(place))
+        ends = Limits.of(limits, place)
+    if ends is not None:
+        check_limited(chosen, given=top is not None or bottom is not None)
     if found is not None:
         check_faulted(chosen, given=top is not None or bottom is not None)
-        return _finished(_faulted(place, Faulting(found), chosen, clock), given, rows, clock)
+        return _finished(_faulted(place, Faulting(found), ends, chosen, clock), given, rows, clock)
     with clock.stage("frame"):
         divide = chosen.parts == "auto" and top is None and METHODS[chosen.method].control
         prepared, bodies = prepare(place, chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
+        bodies, at = _limited(bodies, prepared.frame, ends)
     reference, told = _reference(top, bottom, prepared.frame), ""
     if solid is not None and reference is None:
         bodies = with_shells(bodies, prepared, solid.shell)
@@ -174,7 +184,7 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         mapping = _one_map(fits, prepared, chosen)
     off = uncertainty_of(fits, prepared.frame, chosen)
     measured = measure(mapping, prepared, fits, chosen, clock.stage, uncertainty=off)
-    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, uncertainty=off)
+    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, None, off, at)
     return _finished(record, given, rows, clock)
 
 
@@ -188,7 +198,23 @@ def _finished(
     return Unfolding(record, given, rows)
 
 
-def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: Clock) -> RunRecord:
+def _limited(
+    bodies: list[BodyPoints], frame: Frame, limits: Limits | None
+) -> tuple[list[BodyPoints], tuple[str, ...]]:
+    """Return the bodies with the limits that end them, and these limits' names."""
+    if limits is None:
+        return bodies, ()
+    surfaces = limits.in_work(frame, np.concatenate([body.fitted for body in bodies]))
+    return limited(bodies, surfaces), tuple(surface.name for surface in surfaces)
+
+
+def _faulted(
+    points: Floats,
+    faulting: Faulting,
+    limits: Limits | None,
+    options: UnfoldOptions,
+    clock: Clock,
+) -> RunRecord:
     """Return the run of a body cut into fault blocks, which are unfolded and joined."""
     with clock.stage("faults"):
         prepared, bodies = prepare(points, cut=faulting.cut)
@@ -197,7 +223,7 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
         with clock.stage("faults"):
             faulting.find_surfaces(bodies, untold)
     with clock.stage("faults"):
-        bodies = faulting.walled(bodies)
+        bodies, at = _limited(faulting.walled(bodies), prepared.frame, limits)
     fits = fit_blocks(bodies, prepared.frame, options, clock.stage)
     with clock.stage("joining"):
         fits, found = faulting.join(fits, bodies, options.reach)
@@ -213,7 +239,7 @@ def _faulted(points: Floats, faulting: Faulting, options: UnfoldOptions, clock: 
         )
     off = uncertainty_of(fits, prepared.frame, options)
     measured = measure(mapping, prepared, fits, options, clock.stage, found, off)
-    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off)
+    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off, at)
 
 
 @contextmanager

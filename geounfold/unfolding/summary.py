@@ -51,6 +51,8 @@ class RunRecord:
         What taking the faults out gave; None if there are none.
     uncertainty : PositionUncertainty or None
         How far off the places may be; None if the user did not choose to measure it.
+    limits : tuple of str
+        Names of the limits at which the body ends.
     """
 
     options: UnfoldOptions
@@ -61,6 +63,7 @@ class RunRecord:
     seconds: dict[str, float]
     faulted: FaultResult | None = None
     uncertainty: PositionUncertainty | None = None
+    limits: tuple[str, ...] = ()
 
     @property
     def outside(self) -> int:
@@ -118,6 +121,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "parts": _parts(run),
         "junctions": [_junction(j) for j in run.junctions],
         **_faults(run),
+        **({"limits": list(run.limits)} if run.limits else {}),
         "lattice": _lattice(run),
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,

@@ -74,6 +74,14 @@ def add_unfold(commands: Any) -> Parser:
     )
     add_block_size(group, rare=True)
     _add_faults(group)
+    group.add(
+        "--limits",
+        nargs="+",
+        metavar="L",
+        rare=True,
+        help="where the block model was cut off: surfaces, a box X0,X1,Y0,Y1,Z0,Z1 (empty where it "
+        "goes on) or a .csv polygon; the rim there is no pinch-out",
+    )
     group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
     group.add("--bottom", metavar="B", help="the bottom surface")
     add_frame(group, "POINTS")

@@ -87,6 +87,7 @@ def _outputs(args: Namespace, console: Console) -> Outputs:
     inputs = files_given(
         *(args.points, args.samples, args.top, args.bottom, config_file(args)),
         *(*(args.holes or ()), *(args.faults or ())),
+        *(limit for limit in args.limits or () if limit.count(",") != 5),
     )
     wanted = {
         "--output": (args.output, POINTS_OUT),

@@ -20,6 +20,10 @@ _NEEDS = ("slip_direction", "outline", "slips")
 
 def check_fault_options(args: Namespace) -> None:
     """Raise OptionError if options on faults lack faults, or do not go with others."""
+    if args.limits is not None and args.by is not None:
+        raise OptionError(
+            "--limits are of one body, --by unfolds several domains: choose one by --where"
+        )
     if args.faults is None and args.fault_blocks is None:
         for name in _NEEDS:
             if getattr(args, name) is not None:
@@ -36,7 +40,7 @@ def check_fault_options(args: Namespace) -> None:
 
 
 def read_faults(args: Namespace, table: PointTable | PointStream) -> dict[str, Any]:
-    """Return what `geounfold.unfold` takes on faults; empty if there are none.
+    """Return what `geounfold.unfold` takes on faults and limits; empty if there are none.
 
     Parameters
     ----------
@@ -52,9 +56,10 @@ def read_faults(args: Namespace, table: PointTable | PointStream) -> dict[str, A
     OptionError
         A direction of slip that cannot be read.
     """
+    found: dict[str, Any] = {} if args.limits is None else {"limits": args.limits}
     if args.faults is None and args.fault_blocks is None:
-        return {}
-    found: dict[str, Any] = {"outline": args.outline or "ore"}
+        return found
+    found["outline"] = args.outline or "ore"
     if args.faults is not None:
         from geounfold.faults.given import named_surfaces
 

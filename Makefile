@@ -16,6 +16,7 @@ PYTEST_ARGS ?=
 SYSTEM ?= windows
 BENCH_ARGS ?=
 SCALE_ARGS ?=
+SIDE_ARGS ?=
 SOAK_ARGS ?=
 FIELD_ARGS ?=
 FAULT_ARGS ?= --page docs/results/faults.md
@@ -78,9 +79,10 @@ format: $(STAMP)  ## put the code into the standard format
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(STAMP)  ## time whole runs on several bodies, and one body of 21,600 to 10 M blocks
+bench: $(STAMP)  ## time whole runs, one body of 21,600 to 10 M blocks, and others beside
 	$(BIN)/python tests/benchmarks/bench.py $(BENCH_ARGS)
 	$(BIN)/python tests/benchmarks/scale.py --page --profile $(SCALE_ARGS)
+	$(BIN)/python tests/benchmarks/side_by_side.py --page --keep $(SIDE_ARGS)
 
 soak: $(STAMP)  ## unfold 1,000 random bodies (30 minutes), the field suite (15), faulted ones (15), reliability (15)
 	$(BIN)/python tests/soak/soak.py $(SOAK_ARGS)

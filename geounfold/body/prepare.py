@@ -170,7 +170,7 @@ def prepare(
         record = record if found is None else record.joined(found)
         bodies.append(BodyPoints(_sorted(fitted), _sorted(given[group]), found))
     chosen = np.isin(labels, [own[group[0]] for group in groups])
-    taken = None if frame.steps is None else np.rint(work[chosen] / frame.steps).astype(np.int64)
+    taken = None if frame.steps is None else frame.nearest_cells(work[chosen])
     moved = 0.0 if told is points else float(np.abs(points - told).max())
     prepared = PreparedPoints(
         points, given, frame, lattice, groups, record, cells=taken, moved=moved
@@ -205,7 +205,7 @@ def _mended(
     """
     if frame.steps is None:
         return fitted, None
-    cells = np.rint(fitted / frame.steps).astype(np.int64)
+    cells = frame.nearest_cells(fitted)
     mended = mend(cells)
     filled = mended.filled * frame.steps + 0.0
     at = np.minimum(np.searchsorted(rows, home), len(rows) - 1)

@@ -64,7 +64,7 @@ def separate_bodies(points_work: Floats, frame: Frame) -> Ints:
     """
     labels: Ints | None = None
     if frame.steps is not None:
-        cells, row = OccupiedCells.numbered(np.rint(points_work / frame.steps).astype(np.int64))
+        cells, row = OccupiedCells.numbered(frame.nearest_cells(points_work))
         if not cells.gappy():
             labels = _connected_cells(cells)[row]
     if labels is None:

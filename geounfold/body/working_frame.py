@@ -119,12 +119,32 @@ class Frame:
         """
         if self.steps is None:
             return None
-        cells = points_work / self.steps
-        whole = np.rint(cells)
-        cells -= whole
-        if cells.size and not -TOLERANCE < cells.min() <= cells.max() < TOLERANCE:
-            return None
-        out: Ints = whole.astype(np.int64)
+        steps, out = self.steps, np.empty((len(points_work), 3), np.int64)
+
+        def work(rows: slice) -> bool:
+            cells = points_work[rows] / steps
+            out[rows] = whole = np.rint(cells)
+            cells -= whole
+            return bool(-TOLERANCE < cells.min() <= cells.max() < TOLERANCE)
+
+        return out if all(over_slices(work, len(out), _SLICE)) else None
+
+    def nearest_cells(self, points_work: Floats) -> Ints:
+        """Return the lattice cell nearest to every working point, (n, 3).
+
+        Raises
+        ------
+        ValueError
+            There is no lattice.
+        """
+        if self.steps is None:
+            raise ValueError("the frame has no lattice")
+        steps, out = self.steps, np.empty((len(points_work), 3), np.int64)
+
+        def work(rows: slice) -> None:
+            out[rows] = np.rint(points_work[rows] / steps)
+
+        over_slices(work, len(out), _SLICE)
         return out
 
     def up_in_work(self, world_up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Floats:

@@ -90,11 +90,13 @@ def lattice_nmd(
     low = first - np.abs(offsets).max(axis=0)
     shape = last + np.abs(offsets).max(axis=0) - low + 1
     turn = np.argsort(-shape, kind="stable")  # the longest axis varies slowest: narrow windows
-    cells, shape, low = cells[:, turn], shape[turn], low[turn]
+    shape, low = shape[turn], low[turn]
     if float(np.prod(shape.astype(float))) > 2.0**62:
         return None
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    keys = sum(c * step for c, step in zip((cells - low).T, stride.tolist(), strict=True))
+    keys = np.zeros(len(cells), np.int64)
+    for column, first_cell, step in zip(cells.T[turn], low, stride.tolist(), strict=True):
+        keys += (column - first_cell) * step
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     if (keys[1:] == keys[:-1]).any():
@@ -105,7 +107,7 @@ def lattice_nmd(
     spans = keys[ends] - keys[::_SLICE] + 1 + 2 * margin
     if spans.max() > _WINDOW:
         return None
-    axes = [[np.ascontiguousarray(c) for c in cloud[order].T] for cloud in clouds]
+    axes = [[column[order] for column in cloud.T] for cloud in clouds]
     out = tuple(np.empty(len(keys)) for _ in clouds)
 
     def work(rows: slice) -> None:

@@ -90,10 +90,10 @@ soak: $(STAMP)  ## unfold 1,000 random bodies (30 minutes), the field suite (15)
 	$(BIN)/python tests/soak/faults.py $(FAULT_ARGS)
 	$(BIN)/python tests/soak/uncertainty.py $(UNCERTAINTY_ARGS)
 
-study: $(STAMP)  ## krige in folded, unfolded and true space, 30 minutes; continues a stopped run
+study: $(STAMP)  ## krige in folded, unfolded and true space, 15 minutes; continues a stopped run
 	$(BIN)/python tests/study/study.py -o data/study.csv $(STUDY_ARGS)
 	$(BIN)/python tests/study/tables.py data/study.csv -o docs/study.md \
-	    --figure docs/assets/study.png --link assets/study.png
+	    --figures docs/assets --link assets
 
 notebooks: $(STAMP)  ## make the notebooks from their scripts and run them; RUNS: timed runs each
 	$(BIN)/jupytext --quiet --update --to ipynb notebooks/*.py

@@ -21,6 +21,11 @@ _CROSSED = 0.2  # median cosine between holes and a plane's normal: 78 degrees o
 class Reference(Protocol):
     """A surface with coordinates: along it (two) and height above it."""
 
+    @property
+    def follows(self) -> bool:
+        """Whether the surface itself follows the layer."""
+        ...
+
     def local(self, points: Floats) -> Floats:
         """Return coordinates (n, 3) of world points (n, 3)."""
         ...
@@ -45,11 +50,14 @@ class FoldReference:
         Rows: the two directions of the profile plane, and the fold axis.
     curve : (k, 2) float
         Vertices in the profile plane; the height is positive left of it, and up on most of it.
+    follows : bool
+        True: heights are across the layer.
     """
 
     origin: Floats
     axes: Floats
     curve: Floats
+    follows: bool = True
 
     def local(self, points: Floats) -> Floats:
         """Return coordinates (n, 3): along the curve, along the axis, and height."""
@@ -93,10 +101,13 @@ class PlaneReference:
     origin : (3,) float
     axes : (3, 3) float
         Rows: two in the plane, and its normal, which points up (of an upright plane, to +x or +y).
+    follows : bool
+        False: the layer may slope on the plane.
     """
 
     origin: Floats
     axes: Floats
+    follows: bool = False
 
     def local(self, points: Floats) -> Floats:
         """Return coordinates (n, 3): along the two axes, and height."""

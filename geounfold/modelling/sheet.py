@@ -66,9 +66,9 @@ class Contacts:
 def contacts_of(found: Intercepts, reference: Reference) -> tuple[Contacts, Floats]:
     """Return the contacts of intercepts, and the places (m, 2) where these cross the layer.
 
-    A contact is with the hanging wall if the body lies below it, seen from the layer there: the
-    plane through the middles of the nearest intercepts. A hole across a crest or along a steep limb
-    may meet one wall twice.
+    A contact is with the hanging wall if the body lies below it, seen from the layer there: over a
+    fold its reference surface, over a plane the plane through the middles of the nearest
+    intercepts. A hole across a crest or along a steep limb may meet one wall twice.
     """
     upper, lower = reference.local(found.upper), reference.local(found.lower)
     middle = reference.local(0.5 * (found.upper + found.lower))
@@ -78,7 +78,7 @@ def contacts_of(found: Intercepts, reference: Reference) -> tuple[Contacts, Floa
         reference.local(found.upper + small) - upper,
         reference.local(found.lower - small) - lower,
     )
-    slope = _slopes(middle)
+    slope = np.zeros((len(middle), 2)) if reference.follows else _slopes(middle)
     number = np.arange(len(found))
     parts = []
     for ends, into, there in zip(

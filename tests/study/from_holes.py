@@ -9,7 +9,8 @@ rebuilds it with blocks of 10 m. Rows that are in the output already are not com
   volume   volume of the rebuilt blocks over the true volume, less 1
   right    share of the rebuilt blocks whose centres lie in the true body
   met      share of the true blocks whose centres the rebuilt body holds
-  horizon  RMS distance across the layer of both walls from the true ones, inside the outline, m
+  horizon  RMS distance across the layer of both walls from the true ones, m, a thickness or more
+           inside the outline: at a rim the wall of the rebuilt body bends over its end
   layer    RMS error of the height in the layer after `unfold` of the rebuilt body, m; which side
            of an overturned fold is the top is left open
   known    the same after `unfold` of the true blocks
@@ -38,14 +39,17 @@ FIELD = GradeField("spherical", (200.0, 200.0, 25.0), seed=1)
 
 
 def horizon_error(body, made) -> float:
-    """Return the RMS distance of both walls from the true ones, across the layer."""
+    """Return the RMS distance of both walls from the true ones, across the layer, off the rims."""
     errors = []
     for wall, side in ((made.hanging_wall, 1), (made.footwall, 0)):
         truth, there = body.sheet.unfold(wall.V)
         heights = body.sheet.heights(truth[:, 0], truth[:, 1])
         middle = truth.copy()
         middle[:, 2] = 0.5 * (heights[0] + heights[1])
-        inside = there & body.sheet.inside(middle)
+        low, high = body.truth[:, :2].min(axis=0), body.truth[:, :2].max(axis=0)
+        rim = float((body.top - body.bottom).mean())
+        inner = ((truth[:, :2] > low + rim) & (truth[:, :2] < high - rim)).all(axis=1)
+        inside = there & inner & body.sheet.inside(middle)
         errors.append((truth[:, 2] - heights[side])[inside])
     return float(np.sqrt((np.concatenate(errors) ** 2).mean()))
 

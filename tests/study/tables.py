@@ -1,11 +1,11 @@
-"""Tables and figure of the study: errors by arm, gains and shares with their intervals.
+"""Tables and figures of the study: gains of unfolding, with their intervals, and the forecast.
 
     python tests/study/tables.py [data/study.csv] [-o docs/study.md]
-                                 [--figure docs/assets/study.png] [--link assets/study.png]
+                                 [--figures docs/assets] [--link assets]
 
-Gain: 1 - RMSE(arm) / RMSE(folded_best). Share of the possible gain: what of the difference between
-folded_best and truth an arm reaches. RMSEs are means over runs; between low and high lie 95 % of
-2,000 means over seeds drawn with replacement (bootstrap over seeds, bodies and spacings kept).
+Gain over an arm: 1 - RMSE(geounfold) / RMSE(arm), of the mean logarithm over runs, so that grades
+of every unit weigh alike. Between low and high lie 95 % of 2,000 such means over runs drawn with
+replacement.
 """
 
 from __future__ import annotations
@@ -13,142 +13,235 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-ARMS = ("folded_isotropic", "folded_best", "stratigraphic", "geounfold", "truth")
+RIVALS = ("isotropic", "plane", "plane_truth", "limbs", "stratigraphic")
+FORETOLD = ("isotropic", "plane", "limbs", "stratigraphic")
+KEY = ["body", "spacing", "range", "nugget", "seed"]
 DRAWS = 2000
-FIGURES = (
-    *("rmse", "bias", "slope", "correlation", "cv_rmse", "cv_slope"),
-    *("range_along", "range_across"),
-)
+TURNS = (0, 10, 30, 180)  # degrees within the range
+SHAPES = {
+    "sim_case_1": "gently flexed",
+    "recumbent": "tight",
+    "refolded_tight": "doubly curved",
+    "domino": "faulted",
+}
 
 
-def shares(rmse: dict[str, Any]) -> dict[str, Any]:
-    """Return gain and share of the possible gain of arms, from mean RMSEs: numbers or arrays."""
-    best, ceiling = rmse["folded_best"], rmse["truth"]
-    out = {f"gain {arm}": 1 - rmse[arm] / best for arm in ("stratigraphic", "geounfold", "truth")}
-    for arm in ("stratigraphic", "geounfold"):
-        out[f"share {arm}"] = (best - rmse[arm]) / (best - ceiling)
-    return out
+def wide(table: pd.DataFrame, column: str = "rmse") -> pd.DataFrame:
+    """Return a row for each run, with the errors of its arms as columns."""
+    return table.pivot_table(index=KEY, columns="arm", values=column)
 
 
-def means(table: pd.DataFrame) -> dict[str, float]:
-    """Return the mean RMSE of each arm."""
-    return {arm: float(table.loc[table.arm == arm, "rmse"].mean()) for arm in ARMS}
+def ratios(errors: pd.DataFrame, arm: str = "geounfold") -> pd.DataFrame:
+    """Return logarithms of an arm's error over those of all arms."""
+    return np.log(errors[[arm]].to_numpy() / errors)
 
 
-def intervals(table: pd.DataFrame) -> pd.DataFrame:
-    """Return each of `shares` with the bounds between which 95 % of its bootstrap draws lie."""
-    sums = table.pivot_table(index="seed", columns="arm", values="rmse", aggfunc="sum")
-    counts = table[table.arm == "truth"].groupby("seed").size().to_numpy()
-    draw = np.random.default_rng(0).integers(0, len(sums), (DRAWS, len(sums)))
-    drawn = {arm: sums[arm].to_numpy()[draw].sum(axis=1) / counts[draw].sum(axis=1) for arm in ARMS}
-    rows = {
-        name: (value, *np.quantile(shares(drawn)[name], [0.025, 0.975]))
-        for name, value in shares(means(table)).items()
+def gain(ratio: np.ndarray) -> float:
+    """Return the gain of a mean logarithm; NaN is left out."""
+    return float(1 - np.exp(np.nanmean(ratio)))
+
+
+def interval(ratio: np.ndarray) -> tuple[float, float]:
+    """Return the bounds between which 95 % of the gains over runs drawn again lie."""
+    known = ratio[np.isfinite(ratio)]
+    if len(known) < 2:
+        return float("nan"), float("nan")
+    draw = np.random.default_rng(0).integers(0, len(known), (DRAWS, len(known)))
+    low, high = np.quantile(1 - np.exp(known[draw].mean(axis=1)), [0.025, 0.975])
+    return float(low), float(high)
+
+
+def overall(errors: pd.DataFrame) -> pd.DataFrame:
+    """Return the gain over every rival with its interval."""
+    ratio, rows = ratios(errors), {}
+    for arm in (*RIVALS, "rebuilt", "truth"):
+        if arm in ratio:
+            one = ratio[arm].to_numpy()
+            rows[arm] = (gain(one), *interval(one), int(np.isfinite(one).sum()))
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["gain", "low", "high", "runs"])
+
+
+def cells(table: pd.DataFrame) -> pd.DataFrame:
+    """Return what is known of every run, one row each."""
+    return table[table["arm"] == "geounfold"].set_index(KEY).sort_index()
+
+
+def surface(errors: pd.DataFrame, about: pd.DataFrame, rival: str) -> pd.DataFrame:
+    """Return the gain over a rival by turn within the range, nugget, and ranges per spacing."""
+    ratio = ratios(errors)[rival]
+    about = about.loc[ratio.index]
+    turn = pd.cut(about["turn_in_range"], TURNS, right=False)
+    words = [f"{int(t.left)} to {int(t.right)}" for t in turn.cat.categories]
+    words[-1] = f"{TURNS[-2]} and more"
+    per = ratio.index.get_level_values("range") / ratio.index.get_level_values("spacing")
+    reach = pd.cut(pd.Series(per, index=ratio.index), (0, 1.3, 3.5, 100))
+    names = ["below 1.3", "1.3 to 3.5", "above 3.5"]
+    rows = {}
+    for k, word in enumerate(words):
+        for j, name in enumerate(names):
+            here = (turn.cat.codes == k).to_numpy() & (reach.cat.codes == j).to_numpy()
+            row = {}
+            for nugget in sorted(set(ratio.index.get_level_values("nugget"))):
+                some = here & (ratio.index.get_level_values("nugget") == nugget)
+                row[f"nugget {nugget:.0%}"] = gain(ratio[some]) if some.any() else np.nan
+            if here.any():
+                rows[f"turns {word} degrees; {name} ranges a spacing"] = row
+    return pd.DataFrame(rows).T
+
+
+def by(errors: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Return the gain over each rival by one property of the runs."""
+    ratio = ratios(errors)
+    groups = ratio.groupby(level=column) if column in KEY else None
+    assert groups is not None
+    rows = {}
+    for value, part in groups:
+        name = SHAPES.get(value, value) if isinstance(value, str) else f"{value:g}"
+        rows[f"{column} {name}"] = {arm: gain(part[arm]) for arm in RIVALS}
+    return pd.DataFrame(rows).T
+
+
+def forecast(errors: pd.DataFrame, about: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Return foretold and realised gains by rival."""
+    ratio = ratios(errors)
+    return {
+        arm: pd.DataFrame(
+            {
+                "foretold": about.loc[ratio.index, f"foretold_{arm}"],
+                "realised": 1 - np.exp(ratio[arm]),
+            }
+        ).dropna()
+        for arm in FORETOLD
     }
-    return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "low", "high"])
 
 
-def by_arm(table: pd.DataFrame) -> pd.DataFrame:
-    """Return mean figures by field and arm; of errors of tonnage and metal the mean sizes."""
-    frame = table.copy()
-    errors = [c for c in frame if c.startswith(("tonnage_", "metal_"))]
-    frame[errors] = frame[errors].abs()
-    mean = frame.groupby(["field", "arm"])[[*FIGURES, *errors]].mean()
-    return mean.reindex(pd.MultiIndex.from_product([sorted(frame.field.unique()), ARMS]))
+def calibration(told: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """Return how well the forecast holds: correlation, bias, and where nine of ten runs fall."""
+    rows = {}
+    for arm, frame in {**told, "all": pd.concat(told.values())}.items():
+        off = frame["realised"] - frame["foretold"]
+        low, high = np.quantile(off, [0.05, 0.95])
+        rows[arm] = {
+            "correlation": frame["foretold"].corr(frame["realised"]),
+            "realised less foretold": off.mean(),
+            "5 % below": low,
+            "5 % above": high,
+            "runs": len(frame),
+        }
+    return pd.DataFrame(rows).T
 
 
-def markdown(frame: pd.DataFrame, form: str = ".3f") -> str:
+def markdown(frame: pd.DataFrame, form: str = ".3f", whole: tuple[str, ...] = ("runs",)) -> str:
     """Return a table in Markdown."""
     head = ["", *map(str, frame.columns)]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for name, row in frame.iterrows():
-        label = ", ".join(map(str, name)) if isinstance(name, tuple) else str(name)
-        lines.append("| " + " | ".join([label, *(f"{v:{form}}" for v in row)]) + " |")
+        values = [f"{v:.0f}" if c in whole else f"{v:{form}}" for c, v in row.items()]
+        lines.append("| " + " | ".join([str(name), *values]).replace("nan", "") + " |")
     return "\n".join(lines) + "\n"
 
 
-INTRODUCTION = """# Does it pay?
-
-The study simulates grades in the true flat space of simulated bodies. It drills them in the
-folded space (vertical, inclined and fanned holes), and kriges at blocks drawn from the body. The
-arms differ by the coordinates only: each has the same samples, the same automatic fit of a
-variogram, and the 24 nearest samples, no more than 6 of a hole.
-
-| arm | coordinates |
-|---|---|
-| folded_isotropic | folded, one range |
-| folded_best | folded, the best of nine settings (isotropic, and planes through the true \
-fold axis of five dips, with two or three ranges), chosen by the truth, which no user knows |
-| stratigraphic | x, y, and the true height between bottom and top times the mean thickness |
-| geounfold | unfolded from the blocks, defaults |
-| truth | the true flat coordinates: the ceiling |
-
-Rough fields are spherical or exponential (some lognormal, some layered); smooth fields are
-gaussian. The ranges are 200 m along the layer and 25 m across. There is no arm of locally varying
-anisotropy, because no maintained library uses it in the search for samples.
-""".replace("\\\n", "")
+INTRODUCTION = Path(__file__).with_name("introduction.md")
 
 
-def report(table: pd.DataFrame, figure: str | None = None) -> str:
+def report(table: pd.DataFrame, link: str | None = None) -> str:
     """Return all tables as one text."""
-    runs = table[["body", "spacing", "seed"]].drop_duplicates()
+    errors, about = wide(table), cells(table)
+    left_out = wide(table, "cv_rmse")
     text = [
-        INTRODUCTION,
-        "`make study` makes this page: "
-        f"{len(runs)} runs of {table.body.nunique()} bodies, spacings "
-        f"of {', '.join(map(str, sorted(table.spacing.unique())))} m and {table.seed.nunique()} "
-        "seeds. Grades have a mean of 1 and a standard deviation of 0.4. Lengths are in metres.\n",
-        *([] if figure is None else [f"![RMSE by arm and spacing]({figure})\n"]),
-        "## Gain over the best folded setting, and share of the possible gain\n",
-        "Gain is 1 - RMSE / RMSE of folded_best. Share is the part of the difference between "
-        "folded_best and truth that an arm reaches. 95 % of the means over seeds drawn with "
-        "replacement lie between low and high.\n",
+        INTRODUCTION.read_text(encoding="utf-8"),
+        f"`make study` makes this page: {len(errors)} runs. Gain over an arm is 1 - "
+        "RMSE(geounfold) / RMSE(arm), of the mean logarithm over runs; 95 % of the means over runs "
+        "drawn with replacement lie between low and high.\n",
+        "## All runs\n",
+        markdown(overall(errors)),
+        "## Gain as a surface\n",
+        "Over one plane (plane_truth), by how much the layer turns within the range, how many "
+        "ranges there are to a spacing, and nugget:\n",
+        markdown(surface(errors, about, "plane_truth")),
+        "Over limb domains:\n",
+        markdown(surface(errors, about, "limbs")),
+        *([] if link is None else [f"![Gain by turn and nugget]({link}/study.png)\n"]),
+        "## By body, range, nugget and spacing\n",
+        markdown(pd.concat([by(errors, c) for c in ("body", "range", "nugget", "spacing")])),
+        "## At left-out holes\n",
+        "The gain that whole-hole cross-validation shows, at samples with their nugget, beside "
+        "that at blocks:\n",
+        markdown(_beside(errors, left_out)),
+        "## The forecast of `assess`\n",
+        "`foretold` is the gain that `gu.assess` tells from the samples of a run, `realised` that "
+        "of the run. Nine of ten runs lie between the two bounds, which are those that `assess` "
+        "prints.\n",
+        markdown(calibration(forecast(errors, about))),
+        *([] if link is None else [f"![Foretold and realised gains]({link}/assess.png)\n"]),
     ]
-    groups = {"all": table} | {f"{f} fields": t for f, t in table.groupby("field")}
-    for name, part in groups.items():
-        text += [f"### {name}\n", markdown(intervals(part))]
-    text += ["## Figures by arm\n", markdown(by_arm(table))]
-    rows = {}
-    for key, part in table.groupby(["field", "body", "spacing"]):
-        rows[key] = {
-            **shares(means(part)),
-            "rmse folded_best": part[part.arm == "folded_best"].rmse.mean(),
-        }
-    text += ["## By body and spacing\n", markdown(pd.DataFrame(rows).T)]
     return "\n".join(text)
 
 
-def draw(table: pd.DataFrame, path: Path) -> None:
-    """Draw mean RMSE by arm and spacing, for rough and smooth fields."""
+def _beside(errors: pd.DataFrame, left_out: pd.DataFrame) -> pd.DataFrame:
+    """Return gains at blocks and at left-out samples by nugget."""
+    at, back = ratios(errors), ratios(left_out)
+    rows = {}
+    for nugget, part in at.groupby(level="nugget"):
+        own = back.loc[part.index]
+        rows[f"nugget {nugget:.0%}"] = {
+            "plane, blocks": gain(part["plane"]),
+            "plane, left-out samples": gain(own["plane"]),
+            "limbs, blocks": gain(part["limbs"]),
+            "limbs, left-out samples": gain(own["limbs"]),
+        }
+    return pd.DataFrame(rows).T
+
+
+def draw(table: pd.DataFrame, folder: Path) -> None:
+    """Draw the gain by turn and nugget, and the forecast against what came."""
     from matplotlib.figure import Figure
 
-    colours = ("#999999", "#000000", "#E69F00", "#0072B2", "#009E73")
+    errors, about = wide(table), cells(table)
+    ratio = ratios(errors)
+    colours = {0.0: "#0072B2", 0.3: "#E69F00", 0.6: "#999999"}
     figure = Figure(figsize=(9, 3.6), layout="constrained")
-    names = sorted(table.field.unique())
-    for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
-        part = table[table.field == name]
-        for arm, colour in zip(ARMS, colours, strict=True):
-            mean = part[part.arm == arm].groupby("spacing")["rmse"].mean()
-            style = "--" if arm == "truth" else "-"
-            axes.plot(mean.index, mean, style, marker="o", color=colour, label=arm)
-        axes.set(title=f"{name} fields", xlabel="spacing of holes, m", ylim=(0, None))
-        axes.set_ylabel("RMSE at unsampled blocks")
-    axes.legend(frameon=False, fontsize="small")
-    figure.savefig(path, dpi=120)
+    for axes, rival in zip(
+        figure.subplots(1, 2, sharey=True), ("plane_truth", "limbs"), strict=True
+    ):
+        for nugget, part in ratio.groupby(level="nugget"):
+            turn = about.loc[part.index, "turn_in_range"]
+            axes.plot(
+                turn, 100 * (1 - np.exp(part[rival])), "o", ms=4, alpha=0.7,
+                color=colours.get(nugget, "k"), label=f"nugget {nugget:.0%}",
+            )  # fmt: skip
+        axes.axhline(0, color="k", lw=0.6)
+        axes.set(title=f"over {rival}", xlabel="turn of the layer within the range, degrees")
+    figure.axes[0].set_ylabel("gain of unfolding, %")
+    figure.axes[0].legend(frameon=False, fontsize="small")
+    figure.savefig(folder / "study.png", dpi=120)
+    told = forecast(errors, about)
+    figure = Figure(figsize=(9, 3.2), layout="constrained")
+    limit = 100 * max(float(frame.abs().to_numpy().max()) for frame in told.values())
+    for axes, (arm, frame) in zip(figure.subplots(1, 4, sharey=True), told.items(), strict=True):
+        nugget = frame.index.get_level_values("nugget")
+        for value, colour in colours.items():
+            some = nugget == value
+            axes.plot(100 * frame["foretold"][some], 100 * frame["realised"][some], "o", ms=3,
+                      alpha=0.7, color=colour)  # fmt: skip
+        axes.plot([-10, limit], [-10, limit], color="k", lw=0.6)
+        own = frame["foretold"].corr(frame["realised"])
+        axes.set(title=f"over {arm}: r = {own:.2f}", xlabel="foretold gain, %")
+    figure.axes[0].set_ylabel("realised gain, %")
+    figure.savefig(folder / "assess.png", dpi=120)
 
 
 def main(argv=None) -> int:
-    """Write the tables and the figure."""
+    """Write the tables and the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("study", type=Path, nargs="?", default=Path("data/study.csv"))
     parser.add_argument("-o", "--output", type=Path)
-    parser.add_argument("--figure", type=Path)
-    parser.add_argument("--link", help="how the text names the figure")
+    parser.add_argument("--figures", type=Path, help="folder of the two figures")
+    parser.add_argument("--link", help="how the text names that folder")
     args = parser.parse_args(argv)
     table = pd.read_csv(args.study)
     text = report(table, args.link)
@@ -156,8 +249,8 @@ def main(argv=None) -> int:
         args.output.write_text(text, encoding="utf-8")
     else:
         sys.stdout.write(text)
-    if args.figure:
-        draw(table, args.figure)
+    if args.figures:
+        draw(table, args.figures)
     return 0
 
 

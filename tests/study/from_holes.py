@@ -31,7 +31,7 @@ from geounfold.synthetic import GradeField, drill
 
 BODIES = (
     *(("sim_case_1", "vertical"), ("plunging", "vertical"), ("swelling", "inclined")),
-    *(("steep", "vertical"), ("box", "vertical"), ("recumbent", "inclined"), ("thin", "vertical")),
+    *(("steep", "vertical"), ("box", "vertical"), ("recumbent", "inclined")),
 )
 SPACINGS = (25, 50, 100)
 SIDE = 10.0

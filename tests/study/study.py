@@ -14,7 +14,7 @@ one, and estimated at blocks drawn from it, in arms that differ by nothing but t
   limbs          domains of like dip of the layer, each with its own plane, none uses another's
                  samples
   stratigraphic  x, y, and the height in the layer times the mean thickness
-  rebuilt        unfolded from a body that is rebuilt from the holes
+  rebuilt        unfolded from a body that is rebuilt from the holes; none if it foretells badly
   geounfold      unfolded from the blocks, with the defaults
   truth          the true flat coordinates: the ceiling
 
@@ -126,6 +126,8 @@ def drilled(name: str, spacing: int) -> Drilled:
     rebuilt = None
     try:
         made = gu.body_from_holes(*drill(body, field, spacing, waste=True, **how), code="ORE")
+        if made.error is None or made.error > 0.5:  # of which a warning tells the user
+            raise gu.InputError("left-out holes are foretold badly")
         again = gu.unfold(made.points).map
         rebuilt = again.to_flat(folded), again.to_flat(body.folded[rows])
     except gu.GeounfoldError as error:

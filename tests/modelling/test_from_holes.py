@@ -212,3 +212,48 @@ def test_too_few_holes_are_refused() -> None:
         gu.body_from_holes(collar, code="ORE")
     with pytest.raises(OptionError, match="not both"):
         gu.body_from_holes(collar, survey, lith, BodyOptions(code="ORE"), extent=5.0)
+
+
+def test_walls_that_cannot_be_fitted_are_refused() -> None:
+    from geounfold.modelling.walls import MOST_CONTACTS, fit_walls
+
+    places = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
+    sides = np.array([True, True, True, False])
+    with pytest.raises(InputError, match="the footwall has 1 contacts"):
+        fit_walls(places, np.zeros(4), sides)
+    line = np.column_stack([np.arange(6.0), np.arange(6.0)])
+    with pytest.raises(InputError, match="contacts on one line"):
+        fit_walls(line, np.zeros(6), np.arange(6) < 3)
+    many = np.random.default_rng(0).random((MOST_CONTACTS + 2, 2))
+    with pytest.raises(InputError, match="more than 6000"):
+        fit_walls(many, np.zeros(len(many)), np.arange(len(many)) % 2 == 0)
+
+
+def test_a_fold_that_falls_apart_is_refused() -> None:
+    from geounfold.modelling.fold_profile import profile_curve
+
+    rng = np.random.default_rng(0)
+    parts = np.concatenate([rng.random((50, 2)), rng.random((50, 2)) + 500])
+    with pytest.raises(InputError, match="falls apart in the fold's profile"):
+        profile_curve(parts, rng.random((20, 2)) + 250, 2.0)
+
+
+def test_the_axis_of_a_plunging_fold_is_found() -> None:
+    from geounfold.modelling.fold_axis import angles_of_axis, found_axis
+
+    _, tables = drilled("plunging", 50)
+    holes, options = read_drillholes(*tables), BodyOptions(code="ORE")
+    found = intercepts_of(holes, in_body(holes, options)[0], options)
+    near = traced(holes, found, 10.0).near(found, 150.0)
+    trend, plunge = angles_of_axis(found_axis(near))
+    # The body plunges 18 degrees towards 35; measured 36 and 17.
+    assert abs(trend - 35) < 6
+    assert abs(plunge - 18) < 6
+
+
+def test_assays_beside_the_body_make_no_samples() -> None:
+    collar, survey, lith = plate()
+    made = gu.body_from_holes(collar, survey, lith, code="ORE", block_size=5)
+    above = pd.DataFrame({"hole": collar["hole"], "from": 0.0, "to": 5.0, "AU": 1.0})
+    with pytest.raises(InputError, match="no assay lies in the body"):
+        made.samples(None, read_drillholes(collar, survey, above))

@@ -230,7 +230,8 @@ def draw(table: pd.DataFrame, folder: Path) -> None:
                       alpha=0.7, color=colour)  # fmt: skip
         axes.plot([-10, limit], [-10, limit], color="k", lw=0.6)
         own = frame["foretold"].corr(frame["realised"])
-        axes.set(title=f"over {arm}: r = {own:.2f}", xlabel="foretold gain, %")
+        axes.set(xlabel="foretold gain, %")
+        axes.set_title(f"over {arm}: r = {own:.2f}", fontsize="medium")
     figure.axes[0].set_ylabel("realised gain, %")
     figure.savefig(folder / "assess.png", dpi=120)
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from geounfold.gain import HolesStudy
 
 _ROW, _LEFT, _WIDTH = 26, 120, 640
+_APART = 40  # pixels between two numbers below the chart
 
 _HOW = (
     "Every sample is estimated without its own hole, in five kinds of coordinates that differ by "
@@ -41,7 +42,7 @@ def write_gain_page(path: Path, study: HolesStudy, about: dict[str, Any]) -> Non
 
 def gain_page(study: HolesStudy, about: dict[str, Any]) -> str:
     """Return the page as HTML."""
-    parts = [section("What the left-out holes say", bullets(study.verdicts()))]
+    parts = [section("Errors at left-out holes", bullets(study.verdicts()))]
     records: list[dict[str, Any]] = [
         {str(k): v for k, v in row.items()} for row in study.errors.to_dict(orient="records")
     ]
@@ -79,15 +80,20 @@ def _rows(rows: list[dict[str, Any]], expected: dict[str, float]) -> list[dict[s
                 "bias": row["bias"],
                 "slope": row["slope"],
                 "correlation": row["correlation"],
-                "gain of unfolding, %": "" if own else f"{100 * row['gain']:.1f}",
-                "interval, %": "" if own else f"{100 * row['low']:.1f} to {100 * row['high']:.1f}",
-                "expected, %": "" if own else f"{100 * expected[arm]:.0f}",
+                "gain of unfolding, %": "" if own else _percent(row["gain"]),
+                "interval, %": "" if own else f"{_percent(row['low'])} to {_percent(row['high'])}",
+                "expected, %": "" if own else _percent(expected[arm], 0),
                 "nugget": row["nugget"],
                 "range along": row["range_along"],
                 "across": row["range_across"],
             }
         )
     return out
+
+
+def _percent(share: float, digits: int = 1) -> str:
+    """Return a share in per cent; a zero has no sign."""
+    return f"{round(100 * share, digits) + 0.0:.{digits}f}"
 
 
 def _chart(rows: list[dict[str, Any]], expected: dict[str, float]) -> str:
@@ -101,18 +107,21 @@ def _chart(rows: list[dict[str, Any]], expected: dict[str, float]) -> str:
         return float(_LEFT + (value - low) / (high - low) * (_WIDTH - _LEFT - 20))
 
     height = _ROW * (len(shown) + 1)
-    lines = [f'<path class="line" d="M{px(0):.1f} 0V{height - _ROW}"/>']
+    lines = [f'<path fill="none" stroke="currentColor" d="M{px(0):.1f} 0V{height - _ROW}"/>']
     for k, row in enumerate(shown):
         y, told = _ROW * (k + 0.5), px(expected[row["arm"]])
         lines.append(
-            f'<text x="{_LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{text(row["arm"])}</text>'
-            f'<path class="line" d="M{px(row["low"]):.1f} {y:.1f}H{px(row["high"]):.1f}"/>'
-            f'<circle r="5" cx="{px(row["gain"]):.1f}" cy="{y:.1f}"/>'
-            f'<path class="line" d="M{told:.1f} {y - 8:.1f}v16"/>'
+            f'<text fill="currentColor" x="{_LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">'
+            f"{text(row['arm'])}</text>"
+            f'<path fill="none" stroke="currentColor" '
+            f'd="M{px(row["low"]):.1f} {y:.1f}H{px(row["high"]):.1f}"/>'
+            f'<circle r="5" fill="currentColor" cx="{px(row["gain"]):.1f}" cy="{y:.1f}"/>'
+            f'<path fill="none" stroke="currentColor" d="M{told:.1f} {y - 8:.1f}v16"/>'
         )
-    for tick in sorted({low + 0.02, 0.0, high - 0.02}):
+    ends = [end for end in (low + 0.02, high - 0.02) if abs(px(end) - px(0)) > _APART]
+    for tick in [0.0, *ends]:
         lines.append(
-            f'<text x="{px(tick):.1f}" y="{height - 8}" text-anchor="middle">'
+            f'<text fill="currentColor" x="{px(tick):.1f}" y="{height - 8}" text-anchor="middle">'
             f"{number(round(100 * tick))} %</text>"
         )
     words = "; ".join(

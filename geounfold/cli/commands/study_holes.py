@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geounfold.cli.answers.file_endings import HTML, JSON
@@ -77,9 +78,11 @@ def _written(args: Namespace, outputs: Outputs, study: Any, about: dict[str, Any
 
 
 def _input(args: Namespace) -> dict[str, Any]:
-    """Return what was read, by name."""
-    names = ("collar", "survey", "assays", "body", "code", "cut_off", "where")
-    return {name: str(getattr(args, name)) for name in names if getattr(args, name) is not None}
+    """Return what was read, by name; of files without their folders."""
+    words = {name: getattr(args, name) for name in ("code", "cut_off", "where")}
+    files = {name: getattr(args, name) for name in ("collar", "survey", "assays", "body")}
+    named = {name: Path(file).name for name, file in files.items() if file is not None}
+    return {**named, **{name: word for name, word in words.items() if word is not None}}
 
 
 def _check_grades(grades: list[str], holes: DrillHoles) -> None:

@@ -237,7 +237,7 @@ def _faulted(
             parts=parts,
             body=_body_cells(prepared),
         )
-    off = uncertainty_of(fits, prepared.frame, options)
+    off = uncertainty_of(fits, prepared.frame, options, found)
     measured = measure(mapping, prepared, fits, options, clock.stage, found, off)
     return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off, at)
 

@@ -48,6 +48,24 @@ def test_every_domain_is_unfolded_on_its_own(folder: Path) -> None:
     assert set(told["summaries"]) == set(LODES)
 
 
+@pytest.mark.slow
+def test_blocks_and_samples_of_domains_get_standard_deviations(
+    folder: Path, tmp_path: Path
+) -> None:
+    model = pd.read_csv(folder / "model.csv")
+    rows = model[model["DOMAIN"] == "SEAM"].iloc[:5]
+    rows.to_csv(tmp_path / "q.csv", index=False)
+    words = ["unfold", str(folder / "model.csv"), "-o", str(tmp_path / "o.csv"), "--by", "DOMAIN"]
+    more = ["--samples", str(tmp_path / "q.csv"), "--samples-out", str(tmp_path / "qo.csv")]
+    more += ["--where", "DOMAIN != WASTE", "--uncertainty", "6", "--quiet"]
+    assert main([*words, *more]) == 0
+    flat, carried = pd.read_csv(tmp_path / "o.csv"), pd.read_csv(tmp_path / "qo.csv")
+    for name in ("sd_along", "sd_across"):
+        assert (flat[name].notna() == (flat["DOMAIN"] != "WASTE")).all()
+        # The samples are blocks: they have their blocks' values.
+        np.testing.assert_allclose(carried[name], flat.loc[rows.index, name], rtol=1e-5)
+
+
 def test_a_domain_that_fails_leaves_the_others_standing(folder: Path, capsys) -> None:
     out = folder / "all.csv"
     words = ["unfold", str(folder / "model.csv"), "-o", str(out), "--by", "DOMAIN", "--json"]

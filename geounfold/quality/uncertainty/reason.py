@@ -5,11 +5,11 @@ from __future__ import annotations
 from geounfold.quality.trust import WORDS, Reason, Trust
 from geounfold.quality.uncertainty.position import PositionUncertainty
 
-FAIR, POOR = 0.6, 1.0
+FAIR, POOR = 0.8, 1.1
 """Expected root mean square error, in blocks, from which trust is at most fair, and poor.
 
-On the 106 bodies of the calibration, answers within 0.3 blocks of the truth were expected to be off
-by 0.49 at most; of the four more than a block off, by 0.98 to 2.0.
+On the bodies of the calibration, answers within 0.3 blocks of the truth were expected to be off by
+0.78 at most; the four more than a block off, by 1.15 to 2.3.
 """
 
 

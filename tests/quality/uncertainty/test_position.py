@@ -115,9 +115,8 @@ def test_more_spread_is_more_uncertainty() -> None:
 
 
 def test_noise_of_the_blocks_own_places_is_an_error_of_their_places() -> None:
-    # 0.91 of the variance: the rest is the rigid motion, to which noise adds nothing.
     sd = calibrated(Spread.of(W[:2], {}, (), 0.16**2))
-    assert_allclose(sd, 0.16, rtol=0.06)
+    assert_allclose(sd, 0.16, rtol=0.001)  # and the floor of 0.003
 
 
 def test_shares_of_a_mix_add_up() -> None:

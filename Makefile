@@ -20,7 +20,7 @@ SIDE_ARGS ?=
 SOAK_ARGS ?=
 FIELD_ARGS ?=
 FAULT_ARGS ?= --page docs/results/faults.md
-UNCERTAINTY_ARGS ?=
+UNCERTAINTY_ARGS ?= --page docs/results/uncertainty.md
 RUNS ?= 10
 STUDY_ARGS ?=
 

@@ -3,7 +3,7 @@
     python tests/study/position_errors.py [--seeds 1] [--bodies NAME ...] [-o FILE.csv]
 
 Bodies of the study with noise of 0.2 block sides, and oblique rims.  Grades are simulated in the
-true flat space as in `study.py`, normal ones only, and kriged at blocks in true coordinates, in
+true flat space, normal ones, and kriged at blocks in true coordinates, in
 unfolded ones, and in unfolded ones with the variogram blurred by the uncertainty of the unfolding.
 """
 
@@ -15,12 +15,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from study import COMPOSITE, FIELDS, FITTED, TARGETS, field_of, neighbourhood, some_holes
 
 import geounfold as gu
-from geounfold.estimation import fit_variogram, hole_numbers, krige
+from geounfold.estimation import Neighbourhood, fit_variogram, hole_numbers, krige
 from geounfold.estimation.position_error import with_position_error
-from geounfold.synthetic import PATTERNS, drill
+from geounfold.synthetic import PATTERNS, GradeField, drill
 
 BODIES = {
     "plunging": {"noise": 0.2},
@@ -28,14 +27,47 @@ BODIES = {
     "swelling": {"noise": 0.2},
     "oblique_rims": {},
 }
-NORMAL = (0, 1, 5)  # seeds of `field_of` whose grades are normal, without layers
+FIELDS = ("rough", "smooth")
+RANGES = (200.0, 200.0, 25.0)
+COMPOSITE = 4.0
+TARGETS, FITTED = 600, 700  # blocks; most samples of the fit
+NEAREST, PER_HOLE = 24, 6
 SPACINGS = (50, 100)
 NINETY = 1.6448536  # standard deviations that hold 90 % of normal errors
 
 
+def field_of(kind: str, seed: int) -> GradeField:
+    """Return a field of normal grades: spherical or exponential, or gaussian."""
+    if kind == "smooth":
+        return GradeField("gaussian", RANGES, seed=1000 + seed, mean=1.0, deviation=0.4)
+    model = ("spherical", "exponential")[seed % 2]
+    return GradeField(model, RANGES, seed=seed, mean=1.0, deviation=0.4)
+
+
+def some_holes(holes: np.ndarray, most: int, seed: int) -> np.ndarray:
+    """Return rows of whole holes, drawn until there would be more than so many."""
+    order = np.random.default_rng(seed).permutation(np.unique(holes))
+    count = np.cumsum(np.bincount(holes)[order])
+    chosen = order[: max(2, int(np.searchsorted(count, most, side="right")))]
+    return np.flatnonzero(np.isin(holes, chosen))
+
+
+def neighbourhood(model, points) -> Neighbourhood:
+    """Return the search: everything within reach, the nearest in units of the ranges first."""
+    ranges = np.array(model.ranges) if model.structures else np.ones(3)
+    radii = 2 * np.linalg.norm(np.ptp(points, axis=0)) * ranges / ranges.min()
+    return Neighbourhood(
+        radii=tuple(radii),
+        rotation=model.rotation,
+        min_samples=1,
+        max_samples=NEAREST,
+        max_per_hole=PER_HOLE,
+    )
+
+
 def held(name: str, seed: int, spacing: int, kind: str, u: gu.Unfolding, body) -> list[dict]:
     """Return a row per arm: the share of true grades in the interval, and the error."""
-    field = field_of(kind, NORMAL[seed % len(NORMAL)])
+    field = field_of(kind, seed)
     pattern = PATTERNS[seed % len(PATTERNS)]
     tables = drill(body, field, spacing, pattern=pattern, seed=seed, interval=COMPOSITE / 2)
     samples = gu.read_drillholes(*tables).samples(COMPOSITE)

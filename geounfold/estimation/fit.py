@@ -274,7 +274,11 @@ def _likeliest(
     start, _ = first_shape(subsets, plain, low, high)
     tried = []
     for kind in kinds:
-        tried.append(subsets.fit((kind,), plain, start, low, high))
+        shape = subsets.fit((kind,), plain, start, low, high)
+        if shape.bounds:  # of a rough kind's many maxima perhaps not the highest
+            other = subsets.fit((kind,), plain, _wide_start(P, holes, plain), low, high)
+            shape = min(shape, other, key=lambda one: one.value)
+        tried.append(shape)
         start = tried[0].vector
     best, found = min(tried, key=lambda shape: shape.value), plain
     if anisotropy == "auto":
@@ -294,6 +298,14 @@ def _likeliest(
                 best = nested
     variance = float(v.var()) * subsets.variance(best, found) / float(y.var())
     return _of_grades(best, shares), variance, found
+
+
+def _wide_start(P: Floats, holes: Ints | None, anisotropy: str) -> Floats:
+    """Return a start of ranges twice the spacing of holes, and a quarter of the height."""
+    spacing = hole_spacing(P, holes)
+    flat = 2 * spacing if spacing > 0 else 1.0
+    ranges = np.array([[flat, flat, 0.25 * float(np.ptp(P[:, 2])) or flat]])
+    return packed(np.array([0.3, 0.7]), ranges, 0.0, anisotropy)
 
 
 def _of_grades(shape: Shape, shares: Floats | None) -> Shape:

@@ -181,6 +181,17 @@ def table(rows: pd.DataFrame) -> pd.DataFrame:
     return out.reset_index()
 
 
+def markdown(found: pd.DataFrame) -> list[str]:
+    """Return the rows of `table` as lines of a page."""
+    head = ["fit", "space", "median", "mean", "worst", "all errors", "sets below 0.93"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for row in found.itertuples(index=False):
+        way, space, *shares, below, _ = row
+        cells = [way, space, *(f"{share:.3f}" for share in shares), str(below)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return lines
+
+
 def main(argv=None) -> int:
     """Compute the sets that are not in the output."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -200,7 +211,7 @@ def main(argv=None) -> int:
         last = rows[(rows["set"] == number) & (rows["way"] == args.ways[0])]
         sys.stdout.write(f"{number}: {last['share'].round(3).tolist()}\n")
         sys.stdout.flush()
-    sys.stdout.write(table(rows).round(3).to_string(index=False) + "\n")
+    sys.stdout.write("\n".join(markdown(table(rows))) + "\n")
     return 0
 
 

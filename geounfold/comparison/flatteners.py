@@ -15,6 +15,8 @@ from geounfold.comparison.names import flattener_names
 from geounfold.errors import GeounfoldError, OptionError
 from geounfold.flattening import Flattening, flatten, measures
 from geounfold.geometry.mesh import Floats, Ints, TriMesh, as_trimesh
+from geounfold.io.selection import read_where
+from geounfold.io.tables.points import chosen_rows
 from geounfold.unfolding.clock import Progress
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.run import unfold
@@ -53,6 +55,7 @@ def compare(
     truth: Floats | Mapping[str, Floats] | None = None,
     unfolding: UnfoldOptions | None = None,
     progress: Progress | None = None,
+    where: str | None = None,
 ) -> pd.DataFrame:
     """Compare flatteners on the same surfaces, or methods of unfolding on the same bodies.
 
@@ -77,6 +80,8 @@ def compare(
         since only the surfaces are needed.
     progress : callable, optional
         Called with the name of each stage when it starts.
+    where : str, optional
+        Chooses rows of a DataFrame, such as ``"ROCK=ORE and AU>0.2"``.
 
     Returns
     -------
@@ -104,6 +109,11 @@ def compare(
     >>> table[["flattener", "flips", "error"]].to_numpy().tolist()
     [['spring', 0, ''], ['arap', 0, '']]
     """
+    if where is not None:
+        if not isinstance(points_or_mesh, pd.DataFrame):
+            raise OptionError("where chooses rows by columns: give the blocks as a DataFrame")
+        kept = chosen_rows(read_where(where), points_or_mesh, "the blocks")
+        points_or_mesh = points_or_mesh.loc[kept]
     if methods is not None:
         bodies = _bodies(points_or_mesh, options)
         return compare_methods(

@@ -142,6 +142,11 @@ class UnfoldOptions:
     volumetric_options: VolumetricOptions = field(default_factory=VolumetricOptions)
     isomap_options: IsomapMethodOptions = field(default_factory=IsomapMethodOptions)
 
+    def __new__(cls, *args: Any, **given: Any) -> UnfoldOptions:
+        """Check the names before the dataclass does: OptionError names the nearest one."""
+        check_names(given, cls)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         for name, valid in VALID.items():
             check_one_of(name, getattr(self, name), valid)

@@ -38,3 +38,20 @@ def test_arrays_have_no_columns_to_choose_by() -> None:
     frame = pd.DataFrame(np.zeros((3, 3)), columns=list("xyz")).assign(ROCK="ORE")
     with pytest.raises(gu.InputError, match=r"no row meets where 'ROCK=ORES'.*ORE \(3\)"):
         gu.unfold(frame, where="ROCK=ORES")
+
+
+def test_compare_takes_the_chosen_rows() -> None:
+    body = gu.simulate("slab").folded
+    frame = pd.DataFrame(np.concatenate([body, body + 1e4]), columns=list("xyz"))
+    frame["ROCK"] = np.repeat(["ORE", "WASTE"], len(body))
+    chosen = gu.compare(frame, ["lscm"], where="ROCK=ORE")
+    alone = gu.compare(body, ["lscm"])
+    figures = ["surface", "vertices", "faces", "area_error"]
+    assert chosen[figures].equals(alone[figures])
+    with pytest.raises(gu.OptionError, match="where chooses rows by columns"):
+        gu.compare(body, ["lscm"], where="ROCK=ORE")
+
+
+def test_options_name_the_nearest_one() -> None:
+    with pytest.raises(gu.OptionError, match=r"no option metod .did you mean 'method'"):
+        gu.UnfoldOptions(metod="sheet")

@@ -102,6 +102,7 @@ def _add_method(parser: Parser) -> None:
     group.add(
         "--discretise",
         metavar="N,N,N",
+        rare=True,
         help="points along the sides of a block (default 3,3,3)",
     )
     group.add(
@@ -121,9 +122,15 @@ def _add_method(parser: Parser) -> None:
         metavar="X,Y,Z",
         help="cells that weigh clustered samples in statistics: sides, or auto",
     )
-    group.add("--mean", metavar="X", help="mean for simple kriging (default: that of SAMPLES)")
-    group.add("--power", metavar="X", default="2", help="power of inverse distance (default 2)")
-    group.add("--workers", metavar="N", default="1", help="number of processes (default 1)")
+    group.add(
+        "--mean", metavar="X", rare=True, help="mean for simple kriging (default: that of SAMPLES)"
+    )
+    group.add(
+        "--power", metavar="X", default="2", rare=True, help="power of inverse distance (default 2)"
+    )
+    group.add(
+        "--workers", metavar="N", default="1", rare=True, help="number of processes (default 1)"
+    )
 
 
 def _add_search(parser: Parser) -> None:
@@ -154,6 +161,10 @@ def _add_search(parser: Parser) -> None:
     group.add("--min-samples", metavar="N", help="fewest samples of an estimate (default 4)")
     group.add("--max-samples", metavar="N", help="most samples of an estimate (default 24)")
     group.add("--max-per-hole", metavar="N", help="most samples of one hole (default: no limit)")
-    group.add("--max-per-octant", metavar="N", help="most samples of one octant of the search")
-    group.add("--min-holes", metavar="N", help="fewest holes of an estimate (default 1)")
-    group.add("--min-octants", metavar="N", help="fewest octants with samples (default 1)")
+    group.add(
+        "--max-per-octant", metavar="N", rare=True, help="most samples of one octant of the search"
+    )
+    group.add("--min-holes", metavar="N", rare=True, help="fewest holes of an estimate (default 1)")
+    group.add(
+        "--min-octants", metavar="N", rare=True, help="fewest octants with samples (default 1)"
+    )

@@ -63,7 +63,9 @@ def run(args: Namespace, console: Console) -> None:
         if "--variogram-out" in parts:
             if result.variogram is None:
                 raise OptionError("--variogram-out: inverse_distance has no variogram")
-            parts["--variogram-out"].write_text(result.variogram.to_toml(), encoding="utf-8")
+            parts["--variogram-out"].write_text(
+                result.variogram.to_toml(), encoding="utf-8", newline="\n"
+            )
         if "--report" in parts:
             write_estimate_report(parts["--report"], summary, result, one, table, samples)
     for warning in result.warnings():

@@ -337,6 +337,12 @@ def estimate(  # 21 arguments: a public name; seventeen of them are choices by k
     else:
         centres = _points(_rows(blocks, where, "the blocks"))
         carried = carrier.carry(centres)
+    reached = np.isfinite(carried.points).all(axis=1)
+    if not reached.any():
+        raise InputError(
+            f"the map reaches none of the {len(reached)} blocks: are they in the coordinates of "
+            "the body that was unfolded?"
+        )
     own = np.ones(len(carried.points), dtype=bool)
     if blocks is not None and not all_blocks:
         own = in_body(carrier, centres, carried)
@@ -358,7 +364,6 @@ def estimate(  # 21 arguments: a public name; seventeen of them are choices by k
         flat, targets, _blurred(variogram, position_error), near, mean, power, workers, support
     )
     found: dict[str, Estimates] = {m: rules.krige(m) for m in dict.fromkeys((method, *also))}
-    reached = np.isfinite(carried.points).all(axis=1)
     outside = reached & ~own
     for each, e in found.items():
         found[each] = replace(e, flag=np.where(outside, OUTSIDE_BODY, e.flag))

@@ -37,6 +37,7 @@ def with_position_error(model: Variogram, along: float, across: float) -> Variog
 
     Examples
     --------
+    >>> from geounfold.estimation.variogram import Structure
     >>> model = Variogram(0.0, (Structure("spherical", 1.0, (200.0, 200.0, 20.0)),))
     >>> blurred = with_position_error(model, 2.0, 2.0)
     >>> round(blurred.nugget, 2), round(blurred.sill, 6)

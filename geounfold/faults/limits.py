@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from geounfold.body.fault_surface import FaultSurface, FaultWalls
+from geounfold.body.fault_surface import LIMIT_TOUCHES, FaultSurface, FaultWalls
 from geounfold.body.prepare import BodyPoints
 from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError, OptionError
@@ -76,6 +76,7 @@ class Limits:
                 sides = _upright(name, polygon, low, high)
             elif (box := _box(item)) is not None:
                 sides = _sides(box, low, high)
+                _holds(box, points)
             else:
                 surfaces |= named_surfaces([item])
                 continue
@@ -133,9 +134,9 @@ def limited(bodies: Sequence[BodyPoints], surfaces: tuple[FaultSurface, ...]) ->
     """Return bodies with the limits that end each added to their walls."""
     out = []
     for body in bodies:
-        walls = FaultWalls.around(body.fitted, surfaces)
+        walls = FaultWalls.around(body.fitted, surfaces, LIMIT_TOUCHES)
         if walls is not None and body.walls is not None:
-            walls = FaultWalls(body.walls.surfaces + walls.surfaces, body.walls.signs + walls.signs)
+            walls = body.walls.and_at(walls)
         out.append(body if walls is None else replace(body, walls=walls))
     return out
 
@@ -155,6 +156,17 @@ def _box(item: Any) -> list[float] | None:
     if not all(value is None or isinstance(value, Real) for value in item):
         return None
     return [np.nan if value is None else float(value) for value in item]
+
+
+def _holds(box: list[float], points: Floats) -> None:
+    """Raise InputError if a box holds none of the blocks."""
+    first, last = np.array(box).reshape(3, 2).T
+    first, last = np.where(np.isnan(first), -np.inf, first), np.where(np.isnan(last), np.inf, last)
+    if not ((points > first) & (points < last)).all(axis=1).any():
+        raise InputError(
+            "limits: the box holds no block: a model that was cut off lies inside; its sides are "
+            "x0, x1, y0, y1, z0, z1"
+        )
 
 
 def _sides(box: list[float], low: Floats, high: Floats) -> dict[str, TriMesh]:

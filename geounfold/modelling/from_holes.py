@@ -34,6 +34,7 @@ _NODES = 0.5  # of a block's smallest side: distance of the walls' nodes
 _TRACE = 0.125  # of the median intercept: distance of points along holes
 _BODY = "body"
 _GOOD = 0.02  # the same length, below which a plane is good: a slab has 0, an open fold 0.03
+_TURN = 360.0  # degrees by which a layer may turn over its length: refolded limbs reach 300
 _POOR = 0.5  # wrongly foretold length over that of ore, above which the user is warned
 
 
@@ -93,6 +94,22 @@ class HolesBody:
         sides = " x ".join(f"{s:.6g}" for s in self.block_size)
         count = len(self.intercepts)
         return f"<HolesBody of {len(self)} blocks of {sides} from {count} intercepts>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What speaks against the body, one sentence each."""
+        if self.error is None or self.error <= _POOR:
+            return ()
+        return (
+            f"holes that are left out are foretold badly: {self.error:.0%} of their length in the "
+            "body is wrong; the layer is folded otherwise, or the holes are too far apart",
+        )
+
+    @property
+    def waste(self) -> float:
+        """Share of the intercepts' length that is waste between coded intervals."""
+        within = self.intercepts["to"] - self.intercepts["from"]
+        return float(self.intercepts["waste"].sum() / within.sum())
 
     @property
     def volume(self) -> float:
@@ -168,6 +185,7 @@ class HolesBody:
             },
             "foretold_wrongly": self.error,
             "told": list(self.told),
+            "warnings": list(self.warnings),
             "drillholes": self.holes.facts(),
         }
 
@@ -217,7 +235,7 @@ def body_from_holes(
     >>> survey = pd.DataFrame({"hole": names, "at": 0.0, "azimuth": 0.0, "dip": 90.0})
     >>> lith = pd.DataFrame({"hole": names, "from": 20.0, "to": 40.0, "lith": "ORE"})
     >>> body_from_holes(collar, survey, lith, code="ORE", block_size=10)
-    <HolesBody of 428 blocks of 10 x 10 x 10 from 9 intercepts>
+    <HolesBody of 404 blocks of 10 x 10 x 10 from 9 intercepts>
     """
     if options is not None and changes:
         raise OptionError("give options or its fields by name, not both")
@@ -256,20 +274,16 @@ def _reference(
     plain = _error(found, tries[0], trace) if tries else None
     if options.shape != "plane" and (plain is None or plain > _GOOD):
         try:
-            tries.append(fold_of(found, trace, options.axis))
+            fold = fold_of(found, trace, options.axis)
+            if fold.turn <= _TURN or not tries:
+                tries.append(fold)
         except InputError:
             if not tries:
                 raise
     errors = [_error(found, reference, trace) for reference in tries]
     best = int(np.argmin([np.inf if e is None else e for e in errors]))
     told = [tries[best].told()]
-    error = errors[best]
-    if error is not None and error > _POOR:
-        told.append(
-            f"holes that are left out are foretold badly: {error:.0%} of their length in the body "
-            "is wrong; the layer is folded otherwise, or the holes are too far apart"
-        )
-    return tries[best], error, tuple(told)
+    return tries[best], errors[best], tuple(told)
 
 
 def _error(found: Intercepts, reference: Reference, trace: Traced) -> float | None:

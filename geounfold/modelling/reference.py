@@ -81,14 +81,18 @@ class FoldReference:
         flat = flat + local[:, 2:] * normal
         return np.asarray(np.column_stack([flat, local[:, 1]]) @ self.axes + self.origin)
 
+    @property
+    def turn(self) -> float:
+        """Degrees between the curve's extreme headings."""
+        step = np.diff(self.curve, axis=0)
+        return float(np.ptp(np.degrees(np.unwrap(np.arctan2(step[:, 1], step[:, 0])))))
+
     def told(self) -> str:
         """Return a sentence with the axis and the turn of the curve."""
         trend, plunge = angles_of_axis(self.axes[2])
-        step = np.diff(self.curve, axis=0)
-        heading = np.degrees(np.unwrap(np.arctan2(step[:, 1], step[:, 0])))
         return (
             f"the walls are drawn over a fold about an axis that plunges {plunge:.0f} degrees to "
-            f"{trend:03.0f}, whose layer turns by {np.ptp(heading):.0f} degrees"
+            f"{trend:03.0f}, whose layer turns by {self.turn:.0f} degrees"
         )
 
 

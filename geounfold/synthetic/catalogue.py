@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from geounfold.errors import OptionError
+from geounfold.errors import OptionError, nearest
 from geounfold.synthetic.body import Body
 from geounfold.synthetic.fold_spec import FoldSpec
 from geounfold.synthetic.outline import (
@@ -437,7 +437,9 @@ def simulate(case: str | FoldSpec, *, blocks: int | None = None, **overrides: ob
     """
     name = case if isinstance(case, str) else "custom"
     if isinstance(case, str) and case not in CASES:
-        raise OptionError(f"no simulated body is named {case!r}; valid: {', '.join(CASES)}")
+        raise OptionError(
+            f"no simulated body is named {case!r}{nearest(case, CASES)}; valid: {', '.join(CASES)}"
+        )
     spec = CASES[case] if isinstance(case, str) else case
     spec = spec.with_options(**overrides)
     return sample(name, spec if blocks is None else spec.with_blocks(blocks))

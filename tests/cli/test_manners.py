@@ -51,6 +51,7 @@ class FakeUnfolding(FakeMap):
     """As much of an unfolding as the command line looks at."""
 
     def __init__(self, points: np.ndarray) -> None:
+        self.uncertainty = None
         self.map, self.carried, self.columns = self, self.carry(points), {}
         self.junctions = ()
 

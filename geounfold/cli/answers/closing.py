@@ -19,10 +19,19 @@ def closing_lines(summary: Mapping[str, Any], seconds: float, files: Iterable[st
     files : iterable of str
         The outputs.
     """
+    off = summary.get("uncertainty") or {}
+    error = (
+        []
+        if "rms" not in off
+        else [
+            f"error    {off['rms']:.3g} expected; 90 % of the blocks within {off['within_90']:.3g}"
+        ]
+    )
     return [
         f"blocks   {_blocks(summary)}",
         f"body     {_body(summary)}",
         f"verdict  {'; '.join(_verdict(summary))}",
+        *error,
         f"time     {_time(summary, seconds)}",
         f"files    {', '.join(files)}",
     ]

@@ -24,7 +24,13 @@ from geounfold.cli.arguments.tools import (
 )
 from geounfold.cli.arguments.unfold import add_unfold
 
-_NEGATIVE = ("--up", "--missing", "--origin", "--rotation")  # values may begin with a minus sign
+_NEGATIVE = (
+    "--up",
+    "--missing",
+    "--origin",
+    "--rotation",
+    "--limits",
+)  # values may begin with a minus sign
 
 _EXAMPLES = ("geounfold unfold --help", "geounfold unfold blocks.csv -o flat.csv --report r.html")
 

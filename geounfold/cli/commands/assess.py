@@ -36,4 +36,4 @@ def run(args: Namespace, console: Console) -> None:
     with outputs.writing() as parts:
         if "--summary" in parts:
             write_json(parts["--summary"], found.facts())
-    console.answer(found.facts(), lambda: "\n".join(found.lines()))
+    console.answer(found.facts(), lambda: "\n".join(found.lines()) + "\n")

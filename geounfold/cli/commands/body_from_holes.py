@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from geounfold.modelling import HolesBody
 
 
+_WASTE = 0.02  # share of waste in the intercepts from which grades of the samples are too high
+
+
 def run(args: Namespace, console: Console) -> None:
     """Write the body's blocks, and its walls, intercepts and samples."""
     if args.samples_out is None and (args.assays or args.composite):
@@ -52,7 +55,15 @@ def run(args: Namespace, console: Console) -> None:
     body = body_from_holes(holes, options=options)
     for line in body.told:
         console.note(line)
+    for line in body.warnings:
+        console.warn(line)
     samples = _samples(args, body, settings, length, console)
+    if samples is not None and body.waste > _WASTE:
+        console.warn(
+            f"the blocks hold the waste between intercepts ({body.waste:.1%} of their length), the "
+            "samples do not: their mean grade is too high for the blocks; --max-waste 0 leaves it "
+            "out of both"
+        )
     console.stage("writing")
     with outputs.writing() as parts:
         write_table(parts["--output"], body.table)

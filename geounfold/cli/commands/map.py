@@ -121,6 +121,7 @@ def _carry_points(
     with outputs.writing() as parts:
         if table is not None:
             table.write_parts(parts["--output"], *(c.columns for c in carryings))
+            _check_reached(args.points, sum((c.counts for c in carryings), Counter()))
         if holes is not None:
             holes.write(parts, traced)
     counts = {name: place_counts(found) for name, found in traced.items() if found}
@@ -143,6 +144,15 @@ def _carry_points(
     done = [f"{c['carried']} points carried into {path}" for path, c in written.items() if c]
     console.done(", ".join(done) or f"traces carried into {args.traces_out}")
     console.answer(counts)
+
+
+def _check_reached(source: str, counts: Counter[str]) -> None:
+    """Raise InputError if the map reaches none of the points."""
+    if counts["carried"] and counts["outside"] == counts["carried"]:
+        raise InputError(
+            f"{source}: the map reaches none of the {counts['carried']} points: are they in the "
+            "coordinates of the body that was unfolded?"
+        )
 
 
 def _by_domain(

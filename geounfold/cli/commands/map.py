@@ -121,7 +121,8 @@ def _carry_points(
     with outputs.writing() as parts:
         if table is not None:
             table.write_parts(parts["--output"], *(c.columns for c in carryings))
-            _check_reached(args.points, sum((c.counts for c in carryings), Counter()))
+            if not any(c.unsolved_warnings(args.points) for c in carryings):
+                _check_reached(args.points, sum((c.counts for c in carryings), Counter()))
         if holes is not None:
             holes.write(parts, traced)
     counts = {name: place_counts(found) for name, found in traced.items() if found}

@@ -61,14 +61,6 @@ Measured: at half, two strips narrower than thick are split by their flanks; twi
 """
 
 
-CONTINUES = 0.2
-"""Mean of minus the product of sides at two opposite faces, from which a pair continues the sheet.
-
-Measured: bulges, boudins and the far sides of faults mostly 0.21 to 1, flanks and ends of 130
-bodies at most 0.04, those of a strip narrower than thick 0.08.
-"""
-
-
 def signs(x: Floats) -> Ints:
     """Return 1 for numbers from 0 up, -1 for negative ones."""
     return np.where(x >= 0, 1, -1)
@@ -79,8 +71,7 @@ class Pair:
     """Two opposite sides of a body, and what they were judged by.
 
     ``rows`` (k,) its faces and ``side`` (k,) +1 or -1 for each; ``thickness`` their median
-    distance, working units; ``others`` (m,) marks the faces of other pairs, and ``rank`` (m,) is
-    the pair of each face, -1 for none.
+    distance, working units; ``others`` (m,) marks the faces of other pairs.
     """
 
     candidate: Candidate
@@ -88,7 +79,6 @@ class Pair:
     side: Ints
     thickness: float
     others: Bools
-    rank: Ints
 
 
 def sheet_pair(
@@ -142,15 +132,14 @@ def _pair(name: str, rank: Ints, k: int, faces: Faces, L: sp.csc_array) -> Pair:
     side = signs(lowest_vector(alone.tocsc())) if len(rows) > 2 else np.ones(len(rows), int)
     thickness = float(np.median(faces.distance[rows]))
     others = ((rank >= 0) & (rank != k)) | _parted(faces, rows)
-    return Pair(_candidate(name, rows, side, thickness, faces), rows, side, thickness, others, rank)
+    return Pair(_candidate(name, rows, side, thickness, faces), rows, side, thickness, others)
 
 
 def _whole(faces: Faces, L: sp.csc_array) -> Pair:
     """Return the two sides of the whole hull, by its lowest eigenvector."""
     side, rows = signs(lowest_vector(L)), np.arange(len(faces.area))
     candidate = _candidate("whole hull", rows, side, faces.median, faces)
-    none = np.zeros(len(rows), dtype=bool)
-    return Pair(candidate, rows, side, faces.median, none, np.zeros(len(rows), dtype=np.int64))
+    return Pair(candidate, rows, side, faces.median, np.zeros(len(rows), dtype=bool))
 
 
 def _candidate(name: str, rows: Ints, side: Ints, thickness: float, faces: Faces) -> Candidate:
@@ -199,19 +188,3 @@ def continued_sides(L: sp.csc_array, pair: Pair) -> Floats:
             pull
         )
     return x
-
-
-def flanks(faces: Faces, pair: Pair, x: Floats) -> Bools:
-    """Return the faces of other pairs that are flanks or ends of the sheet, (m,).
-
-    The others continue its top and bottom: the sides ``x`` (m,) reach them from one face and from
-    the opposite one with opposite signs, over a neck or past the steep side of a bulge.
-    """
-    own = pair.rank >= 0
-    rank, hit = pair.rank[own], faces.hit[own]
-    area = faces.area[own]
-    apart = np.bincount(rank, -x[own] * x[hit] * area) / np.bincount(rank, area)
-    continues = np.zeros(len(own), dtype=bool)
-    continues[own] = (apart > CONTINUES)[rank]
-    out: Bools = pair.others & ~continues
-    return out

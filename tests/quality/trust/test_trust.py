@@ -60,7 +60,7 @@ def swelling() -> tuple[Floats, Floats]:
     """Return a layer whose thickness grows fivefold within ten blocks, and its levels."""
     P = _grid((-28, -18, -8), (28, 18, 8))
     x, _, z = P.T
-    half = 1.25 * (1 + 2 * (1 + np.tanh((np.abs(x) - 10) / 4)))
+    half = 1.25 * (1 + 2 * (1 + np.tanh((np.abs(x) - 14) / 4)))
     inside = np.abs(z) < half
     return P[inside], ((z + half) / (2 * half))[inside]
 

@@ -14,7 +14,7 @@ import pandas as pd
 from geounfold.body.fault_surface import LIMIT_TOUCHES, FaultSurface, FaultWalls
 from geounfold.body.prepare import BodyPoints
 from geounfold.body.working_frame import Frame
-from geounfold.errors import GeounfoldError, InputError, OptionError
+from geounfold.errors import InputError, OptionError
 from geounfold.faults.given import named_surfaces
 from geounfold.geometry.mesh import Floats, TriMesh
 
@@ -58,6 +58,7 @@ class Limits:
         ------
         InputError
             A file that is no surface and no polygon.
+            Or a box that holds no block.
         OptionError
             A box without a side, or whose sides are the wrong way round.
         """
@@ -204,7 +205,7 @@ def _polygon(item: Any) -> tuple[str, Floats | None]:
             table = pd.read_csv(path)
             columns = {str(name).strip().lower(): name for name in table.columns}
             corners = table[[columns["x"], columns["y"]]].to_numpy(dtype=np.float64)
-        except (OSError, ValueError, KeyError, GeounfoldError) as error:
+        except (OSError, ValueError, KeyError) as error:
             raise InputError(
                 f"{path}: a polygon is a .csv file with columns x and y, a corner per row: {error}"
             ) from error

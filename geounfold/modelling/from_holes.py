@@ -34,7 +34,7 @@ _NODES = 0.5  # of a block's smallest side: distance of the walls' nodes
 _TRACE = 0.125  # of the median intercept: distance of points along holes
 _BODY = "body"
 _GOOD = 0.02  # the same length, below which a plane is good: a slab has 0, an open fold 0.03
-_TURN = 360.0  # degrees by which a layer may turn over its length: refolded limbs reach 300
+_TURN = 360.0  # degrees by which a layer may turn: simulated sheets by 230 at most, a tube by 360
 _POOR = 0.5  # wrongly foretold length over that of ore, above which the user is warned
 
 

@@ -356,3 +356,17 @@ def test_options_for_values_are_checked(
 ) -> None:
     assert main(estimated(model, tmp_path / "o.csv", *more)) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["estimate", "map"])
+def test_blocks_of_another_place_are_an_error(files, tmp_path: Path, capsys, command: str) -> None:
+    far = pd.read_csv(files["blocks.csv"])
+    far.iloc[:, :3] += 1e5
+    far.to_csv(tmp_path / "far.csv", index=False)
+    out = tmp_path / "out.csv"
+    argv = words(files | {"blocks.csv": str(tmp_path / "far.csv")}, out, "--quiet")
+    if command == "map":
+        argv = ["map", files["m.npz"], str(tmp_path / "far.csv"), "-o", str(out), "--quiet"]
+    assert main(argv) == 2
+    assert f"the map reaches none of the {len(far)}" in capsys.readouterr().err
+    assert not out.exists()

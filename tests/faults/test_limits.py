@@ -85,6 +85,7 @@ def test_a_body_without_limits_is_as_before() -> None:
         ([[None, 500, None, None, None, None]], "no block is near a side"),
         ([[None, 5, None, None, None, None]], r"cuts through the body: .* Give a fault"),
         ([[None] * 6], "the box has no side"),
+        ([[500, None, None, None, None, None]], "the box holds no block"),
         ([[9, 3, None, None, None, None]], "the box ends in x at 3 before 9"),
         ([], "limits is empty"),
         ([np.array([[0.0, 0], [1, 1]])], "three or more corners"),
@@ -116,6 +117,8 @@ def test_limits_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     summary = ["--summary", str(tmp_path / "s.json"), "--limits", str(tmp_path / "licence.csv")]
     assert main([*run, *summary]) == 0
     assert json.loads((tmp_path / "s.json").read_text())["limits"] == ["licence side 2"]
+    assert main([*run, "--overwrite", *summary[:2], "--limits", "-99,20,,,,"]) == 0
+    assert json.loads((tmp_path / "s.json").read_text())["limits"] == ["east"]
     assert main([*run, "--overwrite", "--limits", str(tmp_path / "absent.ts")]) == 2
     assert "absent.ts" in capsys.readouterr().err
     assert main([*run, "--overwrite", "--limits", ",20,,,,", "--by", "x"]) == 2

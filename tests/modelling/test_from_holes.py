@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -257,3 +259,26 @@ def test_assays_beside_the_body_make_no_samples() -> None:
     above = pd.DataFrame({"hole": collar["hole"], "from": 0.0, "to": 5.0, "AU": 1.0})
     with pytest.raises(InputError, match="no assay lies in the body"):
         made.samples(None, read_drillholes(collar, survey, above))
+
+
+def test_the_turn_of_a_fold_is_that_of_its_curve() -> None:
+    # Half a circle turns by 180 degrees, less half a step of the polygon at either end.
+    from geounfold.modelling.reference import FoldReference
+
+    angle = np.linspace(0, np.pi, 181)
+    fold = FoldReference(np.zeros(3), np.eye(3), 50 * np.stack([np.cos(angle), np.sin(angle)], 1))
+    assert fold.turn == pytest.approx(179)
+
+
+def test_a_fold_that_turns_too_far_gives_way_to_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, holes = drilled("box", 50)
+    given = {"code": "ORE", "block_size": 20}
+    assert "over a fold" in " ".join(gu.body_from_holes(*holes, **given).told)
+    monkeypatch.setattr("geounfold.modelling.from_holes._TURN", 1.0)
+    assert "over a plane" in " ".join(gu.body_from_holes(*holes, **given).told)
+
+
+def test_a_body_that_holes_contradict_is_warned_of() -> None:
+    made = gu.body_from_holes(*plate(), code="ORE", block_size=5)
+    assert made.warnings == ()
+    assert "60% of their length" in replace(made, error=0.6).warnings[0]

@@ -101,3 +101,28 @@ def test_the_body_unfolds_and_its_samples_estimate_it(tmp_path: Path) -> None:
     inside = there & body.sheet.inside(truth)
     error = pd.read_csv(flat)["stratigraphic"].to_numpy()[inside] - level[inside]
     assert np.sqrt((error**2).mean()) < 0.03
+
+
+def test_waste_in_the_blocks_that_samples_lack_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Of every intercept from 20 to 40, four are waste: a fifth.
+    collar, survey, _ = plate()
+    rows = [
+        (0, 20, "WASTE"),
+        (20, 28, "ORE"),
+        (28, 32, "WASTE"),
+        (32, 40, "ORE"),
+        (40, 60, "WASTE"),
+    ]
+    lith = pd.DataFrame(
+        [(hole, *row) for hole in collar["hole"] for row in rows],
+        columns=["hole", "from", "to", "lith"],
+    )
+    for name, table in zip(("collar", "survey", "lith"), (collar, survey, lith), strict=True):
+        table.to_csv(tmp_path / f"{name}.csv", index=False)
+    more = ["--code", "ORE", "--max-waste", "5", "--block-size", "5"]
+    assert main(words(tmp_path, *more)) == 0
+    assert "grade is too high" not in capsys.readouterr().err
+    assert main(words(tmp_path, *more, "--samples-out", str(tmp_path / "s.csv"))) == 0
+    assert "waste between intercepts (20.0% of their length)" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from pathlib import Path
 
 from geounfold.backends.system.console import speak_to_any_console
 from geounfold.backends.system.memory import memory_is_limited
@@ -98,9 +99,22 @@ def _outcome(words: Sequence[str], console: Console, ready: Callable[[], None]) 
         if isinstance(error, GeounfoldError):
             _leave_full_stdout()
             return error.exit_status, str(error)
+        if isinstance(error, OSError) and (file := _given_file(error, words)):
+            return 2, f"{file}: cannot be read: {error.strerror}; nothing was written"
         traceback.print_exc()
         return 1, ""
     return 0, ""
+
+
+def _given_file(error: OSError, words: Sequence[str]) -> str:
+    """Return the file that an error of the system names, if it is one of the command's words.
+
+    An input that is removed, or whose disk fails, between two looks at it ends in such an error.
+    """
+    if not isinstance(error.filename, str):
+        return ""
+    given = (word.rpartition("=")[2] if word.startswith("-") else word for word in words)
+    return error.filename if Path(error.filename) in map(Path, given) else ""
 
 
 def _lacks_memory(error: BaseException) -> bool:

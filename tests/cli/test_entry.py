@@ -76,6 +76,12 @@ def test_help_loads_nothing_heavy() -> None:
         (HullError("no hull"), 1, "geounfold: error: no hull\n"),
         (KeyboardInterrupt(), 130, "geounfold: error: interrupted; nothing was written\n"),
         (MemoryError(), 1, "geounfold: error: out of memory; nothing was written\n"),
+        (  # an input that is removed between two looks at it
+            FileNotFoundError(2, "No such file or directory", "p.csv"),
+            2,
+            "geounfold: error: p.csv: cannot be read: No such file or directory; "
+            "nothing was written\n",
+        ),
     ],
 )
 def test_errors_are_one_line(
@@ -126,13 +132,15 @@ def test_pictures_are_tried_before_computing(
     assert list(tmp_path.iterdir()) == [points]
 
 
+@pytest.mark.parametrize("error", [ZeroDivisionError("oops"), OSError(2, "No such", "other")])
 def test_anything_else_is_a_traceback(
+    error: Exception,
     points: Path,
     calls: list[dict[str, Any]],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(geounfold.unfolding.run, "unfold", _raise(ZeroDivisionError("oops")))
+    monkeypatch.setattr(geounfold.unfolding.run, "unfold", _raise(error))
     assert main(["unfold", "p.csv", "-o", "out.csv"]) == 1
     assert "Traceback" in capsys.readouterr().err
 

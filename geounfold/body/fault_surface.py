@@ -212,9 +212,20 @@ class FaultWalls:
             self.surfaces + other.surfaces, self.signs + other.signs, self.touches + other.touches
         )
 
-    def at_faces(self, centres: Floats, normals: Floats) -> Bools:
+    def named(self, name: str) -> FaultWalls | None:
+        """Return the walls of one name alone; None if there are none."""
+        own = [k for k, surface in enumerate(self.surfaces) if surface.name == name]
+        if not own:
+            return None
+        return FaultWalls(
+            tuple(self.surfaces[k] for k in own),
+            tuple(self.signs[k] for k in own),
+            tuple(self.touches[k] for k in own),
+        )
+
+    def at_faces(self, centres: Floats, normals: Floats, within: float = _FACE) -> Bools:
         """Return which faces of a hull, with centres and normals (n, 3), are at a wall."""
-        return self._looking(centres, normals, _FACE)
+        return self._looking(centres, normals, within)
 
     def at_vertices(self, points: Floats, normals: Floats) -> Bools:
         """Return which vertices of a hull, with normals (n, 3), are at a wall."""

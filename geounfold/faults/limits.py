@@ -18,12 +18,40 @@ from geounfold.errors import InputError, OptionError
 from geounfold.faults.given import named_surfaces
 from geounfold.geometry.mesh import Floats, TriMesh
 
-_NEAR = 2.5  # blocks from a limit within which blocks lie at it
+NEAR = 2.5  # blocks from a limit within which blocks lie at it
+_AT = 1.4  # the same from a limit that takes their faces: 0.9 blocks, and half a block
 
 _CUT = 0.2
 """Share of the blocks near a limit that may lie on its other side: more, and it cuts the body."""
 
 _BOX = ("west", "east", "south", "north", "below", "above")
+
+
+@dataclass(frozen=True, eq=False)
+class FoundLimit:
+    """A limit as the blocks lie to it.
+
+    Attributes
+    ----------
+    surface : FaultSurface
+        Working units.
+    blocks : int
+        Number of blocks whose centres are within 1.4 blocks of it, so that their faces are at it.
+    nearest : float
+        Distance of the nearest block's centre, in blocks.
+    used : bool
+        False for a side of a box or polygon that no block is near: the model does not end there.
+    """
+
+    surface: FaultSurface
+    blocks: int
+    nearest: float
+    used: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the surface."""
+        return self.surface.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +115,8 @@ class Limits:
             raise OptionError("limits is empty: give a surface, a box or a polygon")
         return cls(surfaces, frozenset(boxes))
 
-    def in_work(self, frame: Frame, fitted: Floats) -> tuple[FaultSurface, ...]:
-        """Return the limits at which blocks end, in working units.
+    def in_work(self, frame: Frame, fitted: Floats) -> tuple[FoundLimit, ...]:
+        """Return the limits as the blocks lie to them, in working units.
 
         Parameters
         ----------
@@ -102,19 +130,19 @@ class Limits:
         InputError
             No block is near a surface, or near any side of a box; or a surface cuts the body.
         """
-        up, kept = frame.up_in_work(), []
-        nearest = np.inf
+        up, out = frame.up_in_work(), []
         for name, mesh in self.surfaces.items():
             surface = FaultSurface.facing(name, frame.to_work(mesh.V), mesh.F, up)
             seen = surface.sides(fitted)
-            near = (seen.distance < _NEAR) & ~seen.past
-            nearest = min(nearest, float(seen.distance.min()))
-            if not near.any():
+            near = (seen.distance < NEAR) & ~seen.past
+            nearest, used = float(seen.distance.min()), bool(near.any())
+            out.append(FoundLimit(surface, int((seen.distance < _AT).sum()), nearest, used))
+            if not used:
                 if name in self.boxes:
                     continue
                 raise InputError(
                     f"limit {name}: no block is near it (the nearest is "
-                    f"{seen.distance.min():.1f} blocks away): is it in the blocks' coordinates?"
+                    f"{nearest:.1f} blocks away): is it in the blocks' coordinates?"
                 )
             over = float((seen.signed[near] > 0).mean())
             if min(over, 1 - over) > _CUT:
@@ -122,18 +150,18 @@ class Limits:
                     f"limit {name} cuts through the body: {over:.0%} of the blocks near it lie on "
                     "one side; a limit has all on one. Give a fault by --faults"
                 )
-            kept.append(surface)
-        if not kept:
+        if not any(limit.used for limit in out):
+            nearest = min(limit.nearest for limit in out)
             raise InputError(
                 f"limits: no block is near a side (the nearest is {nearest:.1f} blocks away): are "
                 "they in the blocks' coordinates?"
             )
-        return tuple(kept)
+        return tuple(out)
 
 
-def limited(bodies: Sequence[BodyPoints], surfaces: tuple[FaultSurface, ...]) -> list[BodyPoints]:
+def limited(bodies: Sequence[BodyPoints], found: Sequence[FoundLimit]) -> list[BodyPoints]:
     """Return bodies with the limits that end each added to their walls."""
-    out = []
+    out, surfaces = [], tuple(limit.surface for limit in found if limit.used)
     for body in bodies:
         walls = FaultWalls.around(body.fitted, surfaces, LIMIT_TOUCHES)
         if walls is not None and body.walls is not None:

@@ -20,7 +20,8 @@ from geounfold.body.prepare import BodyPoints, PreparedPoints, prepare
 from geounfold.body.working_frame import Frame
 from geounfold.errors import GeounfoldError, InputError
 from geounfold.faults.given import FaultsGiven, Surfaces, block_column
-from geounfold.faults.limits import Limits, limited
+from geounfold.faults.limit_rims import limit_rims
+from geounfold.faults.limits import FoundLimit, Limits, limited
 from geounfold.faults.rejoin import Faulting
 from geounfold.geometry.mesh import Bools, Floats, TriMesh, as_trimesh
 from geounfold.io.result_columns import frame_points
@@ -168,6 +169,7 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         prepared, bodies = prepare(place, chosen.body, parts=divide)
         check_single(prepared.groups, chosen)
         bodies, at = _limited(bodies, prepared.frame, ends)
+        walls = [body.walls for body in bodies]
     reference, told = _reference(top, bottom, prepared.frame), ""
     if solid is not None and reference is None:
         bodies = with_shells(bodies, prepared, solid.shell)
@@ -184,7 +186,8 @@ def unfold(  # the inputs on faults belong together, and to the points as top an
         mapping = _one_map(fits, prepared, chosen)
     off = uncertainty_of(fits, prepared.frame, chosen)
     measured = measure(mapping, prepared, fits, chosen, clock.stage, uncertainty=off)
-    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, None, off, at)
+    rims = limit_rims(at, walls, fits, prepared.frame.scale)
+    record = RunRecord(chosen, prepared, fits, mapping, measured, clock.seconds, None, off, rims)
     return _finished(record, given, rows, clock)
 
 
@@ -200,12 +203,12 @@ def _finished(
 
 def _limited(
     bodies: list[BodyPoints], frame: Frame, limits: Limits | None
-) -> tuple[list[BodyPoints], tuple[str, ...]]:
-    """Return the bodies with the limits that end them, and these limits' names."""
+) -> tuple[list[BodyPoints], tuple[FoundLimit, ...]]:
+    """Return the bodies with the limits that end them, and the limits."""
     if limits is None:
         return bodies, ()
-    surfaces = limits.in_work(frame, np.concatenate([body.fitted for body in bodies]))
-    return limited(bodies, surfaces), tuple(surface.name for surface in surfaces)
+    found = limits.in_work(frame, np.concatenate([body.fitted for body in bodies]))
+    return limited(bodies, found), found
 
 
 def _faulted(
@@ -239,7 +242,8 @@ def _faulted(
         )
     off = uncertainty_of(fits, prepared.frame, options, found)
     measured = measure(mapping, prepared, fits, options, clock.stage, found, off)
-    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off, at)
+    rims = limit_rims(at, [body.walls for body in bodies], fits, prepared.frame.scale)
+    return RunRecord(options, prepared, fits, mapping, measured, clock.seconds, found, off, rims)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from geounfold.backends.system.memory import peak_memory_mb
 from geounfold.body.check import count_duplicates
 from geounfold.body.parts import Junction
 from geounfold.body.prepare import PreparedPoints
+from geounfold.faults.limit_rims import LimitRim
 from geounfold.faults.result import FaultResult
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
@@ -51,8 +52,8 @@ class RunRecord:
         What taking the faults out gave; None if there are none.
     uncertainty : PositionUncertainty or None
         How far off the places may be; None if the user did not choose to measure it.
-    limits : tuple of str
-        Names of the limits at which the body ends.
+    limits : tuple of LimitRim
+        What each limit given takes of the rim.
     """
 
     options: UnfoldOptions
@@ -63,7 +64,7 @@ class RunRecord:
     seconds: dict[str, float]
     faulted: FaultResult | None = None
     uncertainty: PositionUncertainty | None = None
-    limits: tuple[str, ...] = ()
+    limits: tuple[LimitRim, ...] = ()
 
     @property
     def outside(self) -> int:
@@ -121,7 +122,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "parts": _parts(run),
         "junctions": [_junction(j) for j in run.junctions],
         **_faults(run),
-        **({"limits": list(run.limits)} if run.limits else {}),
+        **_limits(run),
         "lattice": _lattice(run),
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
@@ -170,6 +171,7 @@ def warnings_of(run: RunRecord) -> list[str]:
         out.append(run.prepared.mended.sentence())
     out += [_told(junction) for junction in run.junctions]
     out += [] if run.faulted is None else run.faulted.warnings()
+    out += [limit.warning() for limit in run.limits if limit.missed]
     count, outside, empty = len(run.prepared.points), run.outside, run.empty
     if outside > empty:
         out.append(
@@ -264,6 +266,16 @@ def _faults(run: RunRecord) -> dict[str, Any]:
         for block, rows in enumerate(run.prepared.groups)
     ]
     return {"faults": found.rows(), "fault_blocks": blocks, "overlap_share": found.overlap}
+
+
+def _limits(run: RunRecord) -> dict[str, Any]:
+    """Return the limits at which the body ends, and a row of each; nothing without limits."""
+    if not run.limits:
+        return {}
+    return {
+        "limits": [limit.name for limit in run.limits if limit.used],
+        "limit_rims": [limit.row() for limit in run.limits],
+    }
 
 
 def _junction(junction: Junction) -> dict[str, Any]:

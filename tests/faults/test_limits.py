@@ -11,6 +11,7 @@ import pytest
 
 import geounfold as gu
 from geounfold.cli import main
+from geounfold.faults.limit_rims import limits_told
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.quality.flat_truth import flat_rms
 from geounfold.synthetic.body import Sheet
@@ -67,6 +68,11 @@ def test_a_box_and_a_polygon_name_the_side_at_which_blocks_end(limits: object) -
     points = slanted()
     found = gu.unfold(points, limits=[limits])
     assert len(found.summary()["limits"]) == 1
+    # The cut has 13 x 20 faces of blocks, the rim 2 x 13 x (20 + 40): a sixth; the hull rounds
+    # its edges (measured: 0.169).
+    (rim,) = (row for row in found.summary()["limit_rims"] if row["used"])
+    assert rim["blocks"] == 260
+    assert rim["rim_share"] == pytest.approx(1 / 6, abs=0.01)
     # The layer is plane: its level is linear across it, to a hundredth where the model was cut.
     level = (points[:, 0] + points[:, 2]) / np.sqrt(2)
     near = points[:, 0] > 5
@@ -117,8 +123,16 @@ def test_limits_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     summary = ["--summary", str(tmp_path / "s.json"), "--limits", str(tmp_path / "licence.csv")]
     assert main([*run, *summary]) == 0
     assert json.loads((tmp_path / "s.json").read_text())["limits"] == ["licence side 2"]
-    assert main([*run, "--overwrite", *summary[:2], "--limits", "-99,20,,,,"]) == 0
-    assert json.loads((tmp_path / "s.json").read_text())["limits"] == ["east"]
+    # A block off the cut, a limit does nothing: the hull's faces are 1.3 blocks away.
+    assert main([*run[:-1], "--overwrite", *summary[:2], "--limits", "-99,21,,,,"]) == 0
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert found["limits"] == ["east"]
+    told = capsys.readouterr().err
+    assert "limit east takes 0.0% of the rim and changes little or nothing: the rim" in told
+    assert "looks at it is 1.3" in told
+    assert limits_told(found["limit_rims"]) == (
+        "east takes 0% of the rim (0 blocks), 1 side near no block"
+    )
     assert main([*run, "--overwrite", "--limits", str(tmp_path / "absent.ts")]) == 2
     assert "absent.ts" in capsys.readouterr().err
     assert main([*run, "--overwrite", "--limits", ",20,,,,", "--by", "x"]) == 2

@@ -31,6 +31,7 @@ def closing_lines(summary: Mapping[str, Any], seconds: float, files: Iterable[st
         f"blocks   {_blocks(summary)}",
         f"body     {_body(summary)}",
         f"verdict  {'; '.join(_verdict(summary))}",
+        *_limits(summary),
         *error,
         f"time     {_time(summary, seconds)}",
         f"files    {', '.join(files)}",
@@ -84,6 +85,14 @@ def _verdict(summary: Mapping[str, Any]) -> Iterator[str]:
         why = f": {reasons[0]['what']}" if reasons else ""
         more = f" and {len(reasons) - 1} more" if len(reasons) > 1 else ""
         yield f"trust {trust['word']}{why}{more}"
+
+
+def _limits(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the line on what the limits take of the rim, if any were given."""
+    if summary.get("limit_rims"):
+        from geounfold.faults.limit_rims import limits_told
+
+        yield f"limits   {limits_told(summary['limit_rims'])}"
 
 
 def _time(summary: Mapping[str, Any], seconds: float) -> str:

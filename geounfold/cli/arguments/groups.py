@@ -123,7 +123,7 @@ def add_holes(section: Section) -> None:
         "--holes",
         nargs=3,
         metavar=("COLLAR", "SURVEY", "ASSAY"),
-        help="tables of drill-holes; minimum curvature between surveys",
+        help="tables of drill-holes; paths by minimum curvature",
     )
     section.add(
         "--composite", metavar="LENGTH", help="length of composites along a hole, from its collar"

@@ -56,6 +56,13 @@ turned block models:
   axis turns downwards about it, in degrees. With --origin, OUT has world_x,
   world_y and world_z too; commands read these before other coordinates."""
 
+LIMITS = """\
+limits of the model, with --limits L ...:
+  L is a surface file, a box X0,X1,Y0,Y1,Z0,Z1 (empty where the model goes on)
+  or a .csv polygon of x and y. The rim there is a cut, no pinch-out. A limit
+  passes within half a block of the blocks' faces; the closing lines and the
+  summary tell what share of the rim each takes."""
+
 HOLES = """\
 drill-holes:
   --samples-out has hole, from, to; x, y, z of the midpoint of each interval or

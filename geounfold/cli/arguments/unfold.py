@@ -20,6 +20,7 @@ from geounfold.cli.arguments.texts import (
     FORMATS,
     HOLES,
     KEPT_ROWS,
+    LIMITS,
     POINTS,
     RESULTS,
     WHERE,
@@ -55,7 +56,9 @@ def add_unfold(commands: Any) -> Parser:
         commands,
         "unfold",
         "take the folds out of an ore body",
-        details=joined(f"{RESULTS}\n{_DISTORTION}", KEPT_ROWS, WHERE, ANGLES, HOLES, FORMATS),
+        details=joined(
+            f"{RESULTS}\n{_DISTORTION}", KEPT_ROWS, WHERE, LIMITS, ANGLES, HOLES, FORMATS
+        ),
         examples=_EXAMPLES,
     )
     group = parser.section("body")
@@ -78,9 +81,7 @@ def add_unfold(commands: Any) -> Parser:
         "--limits",
         nargs="+",
         metavar="L",
-        rare=True,
-        help="where the block model was cut off: surfaces, a box X0,X1,Y0,Y1,Z0,Z1 (empty where it "
-        "goes on) or a .csv polygon; the rim there is no pinch-out",
+        help="where the model was cut off: surfaces or a box",
     )
     group.add("--top", metavar="T", help="the top surface: a mesh file or a table")
     group.add("--bottom", metavar="B", help="the bottom surface")

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError, OptionError, check_number
+from geounfold.estimation.axes import AxisInBody, axes_in_body
 from geounfold.estimation.declustering import Declustering, decluster
 from geounfold.estimation.fit import FittedVariogram, fit_variogram
 from geounfold.estimation.flat_samples import FlatSamples, flat_samples, in_body
@@ -141,6 +142,13 @@ class Estimation:
         )  # fmt: skip
 
     @property
+    def axes(self) -> tuple[AxisInBody, ...]:
+        """The variogram's axes in the layer, with their directions in the body."""
+        if self.variogram is None:
+            return ()
+        return axes_in_body(self.variogram, self.samples.points, self.samples.folded)
+
+    @property
     def _kriged_with(self) -> Variogram | None:
         return _blurred(self.variogram, self.position_error)
 
@@ -196,6 +204,7 @@ class Estimation:
                 "discretised": list(self.support.numbers),
             },
             "variogram": None if self.variogram is None else self.variogram.facts(),
+            "variogram_axes": [axis.row() for axis in self.axes],
             "position_error": self.position_error,
             "variogram_fitted": self.fitted is not None,
             "variogram_fit": None if self.fitted is None else self.fitted.facts(),

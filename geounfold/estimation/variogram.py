@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -279,8 +279,13 @@ class Variogram:
             "rotation": list(self.rotation),
         }
 
-    def to_toml(self) -> str:
+    def to_toml(self, notes: Sequence[str] = ()) -> str:
         """Return the model as a text that can be edited and that `from_toml` reads.
+
+        Parameters
+        ----------
+        notes : sequence of str, optional
+            Further comments, a line each.
 
         Examples
         --------
@@ -289,9 +294,13 @@ class Variogram:
         True
         """
         lines = [
-            "# Variogram in the unfolded space; lengths in the map's unit.",
+            "# Variogram in the unfolded space; lengths in the map's unit. There x and y lie in",
+            "# the layer, z across it. Azimuths are clockwise from the unfolded y, not from north.",
+            *(f"# {note}" for note in notes),
             f"nugget = {self.nugget!r}  # variance at distance 0",
-            f"rotation = {list(self.rotation)}  # bearing, plunge, dip of the axes, degrees",
+            "# Bearing (azimuth of axis 2), its plunge, and dip of axis 1, degrees. Axis 1 lies 90",
+            "# degrees clockwise of axis 2; axis 3 is square to both: across the layer.",
+            f"rotation = {list(self.rotation)}",
         ]
         for s in self.structures:
             lines += [
@@ -299,7 +308,7 @@ class Variogram:
                 "[[structures]]",
                 f'kind = "{s.kind}"  # {", ".join(KINDS)}',
                 f"sill = {s.sill!r}",
-                f"ranges = {list(s.ranges)}  # along axis 1 and 2 (in the layer) and 3 (across)",
+                f"ranges = {list(s.ranges)}  # along axes 1 and 2 (in the layer) and 3 (across)",
             ]
             if s.kind == "matern":
                 lines.append(f"smoothness = {s.smoothness!r}")

@@ -53,6 +53,7 @@ def test_blocks_come_back_with_estimates(files, tmp_path: Path) -> None:
     assert told["blocks"]["estimated"] == int((got.CU_flag == "estimated").sum())
     assert told["neighbourhood"]["max_per_hole"] == 6
     assert told["cross_validation"]["count"] > 0
+    assert [axis["axis"] for axis in told["variogram_axes"]] == [1, 2]
     # The summary's variogram repeats the run.
     again = tmp_path / "again.csv"
     assert main(words(files, again, "--variogram", str(summary), *more[3:])) == 0
@@ -81,7 +82,10 @@ def test_errors_of_places_widen_the_variance(files, tmp_path: Path, capsys) -> N
 def test_the_variogram_goes_out_and_in_as_a_file(files, tmp_path: Path, capsys) -> None:
     out, again, model = tmp_path / "out.csv", tmp_path / "again.csv", tmp_path / "v.toml"
     assert main(words(files, out, "--variogram-out", str(model), "--quiet")) == 0
-    assert "[[structures]]" in model.read_text(encoding="utf-8")
+    text = model.read_text(encoding="utf-8")
+    assert "[[structures]]" in text
+    told = r"# Axis 2: azimuth \d+ in the unfolded space; in the body it trends \d+ and plunges \d+"
+    assert re.search(told, text)
     assert main(words(files, again, "--variogram", str(model), "--quiet")) == 0
     assert again.read_bytes() == out.read_bytes()
     assert (pd.read_csv(out).CU_flag == "estimated").all()  # radii leave none empty

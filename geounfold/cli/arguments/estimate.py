@@ -29,9 +29,11 @@ results, for a grade CU:
 
 SAMPLES and BLOCKS are in the folded space; the map carries both. The variogram
 and the search are in the unfolded space: the first two axes lie in the layer,
-the third across it. --variogram-out writes the model as --variogram reads it:
+the third across it. Azimuths there are from the unfolded y axis, not from
+north. --variogram-out writes the model as --variogram reads it, with the
+directions of the axes in the body as comments:
   nugget = 0.1
-  rotation = [0, 0, 0]       # bearing, plunge and dip of the axes, in degrees
+  rotation = [0, 0, 0]       # azimuth of axis 2, its plunge, dip of axis 1
   [[structures]]             # one or more
   kind = "spherical"         # or exponential, gaussian, matern (smoothness)
   sill = 0.9

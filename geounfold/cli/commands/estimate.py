@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 def run(args: Namespace, console: Console) -> None:
     """Estimate a grade on blocks from samples, in the unfolded space of a saved map."""
     from geounfold.cli.inputs.estimation import estimation, summarised
+    from geounfold.estimation.axes import axes_told
 
     outputs = Outputs.planned(
         {
@@ -64,7 +65,7 @@ def run(args: Namespace, console: Console) -> None:
             if result.variogram is None:
                 raise OptionError("--variogram-out: inverse_distance has no variogram")
             parts["--variogram-out"].write_text(
-                result.variogram.to_toml(), encoding="utf-8", newline="\n"
+                result.variogram.to_toml(axes_told(result.axes)), encoding="utf-8", newline="\n"
             )
         if "--report" in parts:
             write_estimate_report(parts["--report"], summary, result, one, table, samples)

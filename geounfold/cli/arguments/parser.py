@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from functools import partial
+from itertools import takewhile
 
 from geounfold import _version
 from geounfold.cli.arguments.blocks import add_fill, add_grid, add_transfer
@@ -23,6 +24,7 @@ from geounfold.cli.arguments.tools import (
     add_view,
 )
 from geounfold.cli.arguments.unfold import add_unfold
+from geounfold.errors import OptionError
 
 _NEGATIVE = (
     "--up",
@@ -31,6 +33,9 @@ _NEGATIVE = (
     "--rotation",
     "--limits",
 )  # values may begin with a minus sign
+
+GREEDY = ("--faults", "--limits", "--slip-direction", "--uncertainty", "--colour")
+"""Options that take the words behind them, also a file that is meant as POINTS."""
 
 _EXAMPLES = ("geounfold unfold --help", "geounfold unfold blocks.csv -o flat.csv --report r.html")
 
@@ -56,9 +61,41 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         After a help and ``--version``, with status 0.
     """
     words = list(argv) or ["--help"]
-    args = build_parser(holes="--holes" in words).parse_args(_joined(words))
+    try:
+        args = build_parser(holes="--holes" in words).parse_args(_joined(words))
+    except OptionError as error:
+        if "arguments are required: " not in str(error):
+            raise
+        taken = taken_by_options(words)
+        raise OptionError(f"{error}{taken and '; '}{taken}") from error
     args.words = list(argv)
     return args
+
+
+def taken_by_options(words: Sequence[str]) -> str:
+    """Return which options took the words behind them, for an error on a missing file.
+
+    Examples
+    --------
+    >>> taken_by_options(["unfold", "--faults", "F1.ts", "blocks.csv", "-o", "flat.csv"])
+    "--faults took all words behind it; if 'blocks.csv' is the file that is missing, put it first"
+    >>> taken_by_options(["unfold", "-o", "flat.csv"])
+    ''
+    """
+    found = []
+    for k, word in enumerate(words):
+        behind = list(takewhile(lambda w: w[:1] != "-", words[k + 1 :]))
+        if word in GREEDY and behind:
+            found.append((word, f"'{behind[-1]}'"))
+    if not found:
+        return ""
+    options, last = (" and ".join(names) for names in zip(*found, strict=True))
+    each = "it" if len(found) == 1 else "them"
+    which = last if len(found) == 1 else f"one of {last}"
+    return (
+        f"{options} took all words behind {each}; if {which} is the file that is missing, put it "
+        "first"
+    )
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

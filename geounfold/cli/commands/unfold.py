@@ -14,6 +14,7 @@ from geounfold.cli.inputs.drillholes import check_hole_options
 from geounfold.cli.inputs.faults import check_fault_options
 from geounfold.cli.inputs.grades import check_grade_options, exploration
 from geounfold.cli.inputs.points import files_given
+from geounfold.cli.inputs.solid import check_points_given
 from geounfold.cli.inputs.unfold_options import command_line, config_file, unfold_options
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import GeounfoldError, OptionError
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 def run(args: Namespace, console: Console) -> None:
     """Unfold a body and write all outputs that are wanted."""
+    check_points_given(args)
     if args.holes is None and (args.samples is None) != (args.samples_out is None):
         raise OptionError("--samples and --samples-out belong together: give both or neither")
     check_hole_options(args)

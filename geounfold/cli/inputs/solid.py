@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geounfold.cli.arguments.parser import taken_by_options
 from geounfold.cli.inputs.numbers import number
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError, OptionError
@@ -35,17 +36,24 @@ def open_solid(args: Namespace, console: Console) -> FilledSolid | None:
     """
     from geounfold.io.solids import is_wireframe
 
-    if args.points is None:
-        if args.top is None or args.bottom is None:
-            raise OptionError(
-                "POINTS is missing: give block centroids or a closed surface, or --top and "
-                "--bottom for the body between two surfaces"
-            )
-    elif not is_wireframe(existing_file(Path(args.points)), getattr(args, "element", None)):
+    check_points_given(args)
+    if args.points is not None and not is_wireframe(
+        existing_file(Path(args.points)), getattr(args, "element", None)
+    ):
         _check_unused(args, _BLOCKS_ONLY, f"needs a closed surface; {args.points} holds points")
         return None
     _check_unused(args, _POINTS_ONLY, "needs block centroids, not surfaces")
     return filled(args, console)
+
+
+def check_points_given(args: Namespace) -> None:
+    """Raise OptionError if there is neither POINTS nor a body between two surfaces."""
+    if args.points is None and (args.top is None or args.bottom is None):
+        needed = (
+            "give block centroids or a closed surface, or --top and --bottom for the body between "
+            "two surfaces"
+        )
+        raise OptionError(f"POINTS is missing: {taken_by_options(args.words) or needed}")
 
 
 def filled(args: Namespace, console: Console) -> FilledSolid:

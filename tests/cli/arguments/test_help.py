@@ -9,7 +9,7 @@ import pytest
 
 from geounfold.cli import main
 from geounfold.cli.arguments.help import Parser
-from geounfold.cli.arguments.parser import build_parser
+from geounfold.cli.arguments.parser import GREEDY, build_parser
 from geounfold.errors import OptionError
 
 TOP = build_parser()
@@ -82,3 +82,14 @@ def test_the_examples_are_valid(command: str) -> None:
 def test_an_unknown_option_is_one_line() -> None:
     with pytest.raises(OptionError, match=r"--frobnicate \(see 'geounfold --help'\)"):
         TOP.parse_args(["view", "p.csv", "-o", "p.png", "--frobnicate"])
+
+
+def test_every_option_that_may_take_a_file_meant_as_points_is_known() -> None:
+    open_ended = {
+        flag
+        for command in COMMANDS.values()
+        for action in command._actions
+        for flag in action.option_strings
+        if action.nargs in ("+", "*", "?")
+    }
+    assert open_ended == set(GREEDY)

@@ -52,7 +52,18 @@ def test_fill_takes_two_surfaces(solid):
     [
         ("fill open.ply", "open.ply: the surface is not closed: 1 open border"),
         ("unfold open.ply", "by --top and --bottom"),
-        ("unfold", "POINTS is missing"),
+        ("unfold", "POINTS is missing: give block centroids or a closed surface"),
+        (
+            "unfold --faults f.ts p.csv",
+            "POINTS is missing: --faults took all words behind it; if "
+            "'p.csv' is the file that is missing, put it first",
+        ),
+        ("unfold --uncertainty p.csv", "--uncertainty took all words behind it; if 'p.csv'"),
+        (
+            "unfold --limits l.ts p.csv --faults f.ts",
+            "--limits and --faults took all words behind them; if one of 'p.csv' and 'f.ts' is",
+        ),
+        ("view --colour p.csv", "--colour took all words behind it; if 'p.csv'"),
         ("fill", "fill needs SOLID, or --top and --bottom"),
         ("fill solid.ply --top open.ply", "fill needs SOLID, or --top and --bottom"),
         ("fill --top open.ply", "--top and --bottom belong together"),

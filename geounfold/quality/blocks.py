@@ -139,7 +139,8 @@ class Quality:
     edge_change : Statistics
         |relative change of length| over the control mesh's edges.
     volume_folded, volume_unfolded : float
-        Signed volume of the control mesh in both spaces.
+        Signed volume of the control mesh in both spaces. The mesh reaches past the blocks: this
+        is not the body's volume.
     inverted_folded, inverted_unfolded : int
         Tetrahedra whose volume is not positive.  For a map without a control mesh: 0, and the
         number of blocks whose deformation gradient has a determinant that is not positive.

@@ -206,12 +206,14 @@ _MADE = {
     "bodies": "bodies",
     "hull.method": "hull",
     "hull.reason": "why this hull",
-    "hull.volume": "volume of the hull",
-    "hull.blocks_volume": "volume of the blocks",
+    "body_volume.folded": "volume of the blocks",
+    "body_volume.unfolded": "volume of the blocks, unfolded",
+    "hull.volume": "volume of the hull of the largest body",
+    "hull.blocks_volume": "volume of that body's blocks",
     "control_mesh.vertices": "corners of the map's cells",
     "control_mesh.tetrahedra": "cells of the map",
-    "control_mesh.volume_folded": "volume of the map, folded",
-    "control_mesh.volume_unfolded": "volume of the map, unfolded",
+    "control_mesh.volume_folded": "volume of the map's cells, which reach past the blocks",
+    "control_mesh.volume_unfolded": "the same, unfolded",
     "outside.reach": "extrapolation reaches from the map's cells",
 }
 _METHOD = {

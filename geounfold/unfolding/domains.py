@@ -267,6 +267,7 @@ def _result_row(name: str, u: Unfolding) -> dict[str, Any]:
         "outcome": "proved" if u.injective else "not proved",
         "trust": None if u.trust is None else u.trust.word,
         "nmd_mean": u.quality.nmd.mean,
+        "body_volume": u.body_volume["folded"],
         "volume_folded": u.quality.volume_folded,
         "volume_unfolded": u.quality.volume_unfolded,
         "outside_share": u.outside_share,
@@ -281,6 +282,7 @@ def _failure_row(name: str, blocks: int, error: GeounfoldError) -> dict[str, Any
         (
             "trust",
             "nmd_mean",
+            "body_volume",
             "volume_folded",
             "volume_unfolded",
             "outside_share",

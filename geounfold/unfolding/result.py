@@ -21,7 +21,7 @@ from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
 from geounfold.surfaces.hull import Hull
 from geounfold.unfolding.measured import in_world
 from geounfold.unfolding.notebook_card import Facts
-from geounfold.unfolding.summary import RunRecord, full_box, summarise, warnings_of
+from geounfold.unfolding.summary import RunRecord, body_volume, full_box, summarise, warnings_of
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -107,6 +107,11 @@ class Unfolding:
     def location(self) -> np.ndarray:
         """``inside``, ``extrapolated`` or ``outside`` (empty) for every point, (n,) of str."""
         return self.carried.location
+
+    @property
+    def body_volume(self) -> dict[str, float | None]:
+        """Volume of the blocks, ``folded`` and ``unfolded``; None if it is not known."""
+        return body_volume(self._record)
 
     @cached_property
     def body_part(self) -> Ints:

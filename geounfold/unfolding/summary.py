@@ -127,6 +127,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
         "peak_memory_mb": peak_memory_mb(),
+        "body_volume": body_volume(run),
         "hull": _hull(run),
         **{name: _surface(pair) for name, pair in surfaces.items()},
         "flattening": {name: _flattening(found) for name, found in fit.flattenings.items()},
@@ -206,6 +207,23 @@ def full_box(run: RunRecord) -> list[int] | None:
     sides = np.ptp(cells, axis=0) + 1
     full = len(cells) >= np.prod(sides.astype(np.float64))
     return [int(side) for side in sides] if full else None
+
+
+def body_volume(run: RunRecord) -> dict[str, float | None]:
+    """Return the volume of the blocks in both spaces; None if it is not known.
+
+    That of the folded space is the number of cells that the blocks take, times the volume of one;
+    points without a lattice have none. That of the unfolded space is only known if a block is a
+    cell each, because sub-blocks do not count alike.
+    """
+    prepared = run.prepared
+    if prepared.cells is None:
+        return {"folded": None, "unfolded": None}
+    folded = len(prepared.cells) * prepared.frame.scale**3
+    ratio = run.measured.quality.blocks.volume_ratio[np.concatenate(prepared.groups)]
+    known = ratio[np.isfinite(ratio)]
+    alike = len(prepared.cells) == prepared.chosen and len(known) > 0
+    return {"folded": folded, "unfolded": folded * float(known.mean()) if alike else None}
 
 
 def _apart(run: RunRecord) -> Ints:

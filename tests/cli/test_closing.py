@@ -16,6 +16,7 @@ SUMMARY = {
     "outside": {"extrapolated": 12, "empty": 0},
     "flat_size": {"length": 2699.2, "width": 1268.4, "thickness": 116.58},
     "hull": {"volume": 1.8388e8},
+    "body_volume": {"folded": 54400 * 15 * 15 * 5, "unfolded": None},
     "injective": True,
     "horizons": {"top": 0.0101, "bottom": 0.006},
     "nmd": {"mean": 0.0467, "p95": 0.123},
@@ -29,7 +30,8 @@ def test_a_run_ends_in_five_lines() -> None:
     lines = closing_lines(SUMMARY, 54.31, names_of(["flat.csv", None, "r.html"]))
     assert lines == [
         "blocks   54,400 of 15 x 15 x 5 unfolded, 12 outside the mesh, extrapolated",
-        "body     2699 long and 1268 wide when flat, 116.6 thick (median), volume 1.839e+08",
+        "body     2699 long and 1268 wide when flat, 116.6 thick (median), volume of the blocks "
+        "6.12e+07",
         "verdict  proved one-to-one; top and bottom level to 1.0% of the thickness; distances to "
         "neighbours change by 4.7%, for 95% of the blocks by less than 12%; trust fair: the top "
         "steps and 1 more",
@@ -41,6 +43,11 @@ def test_a_run_ends_in_five_lines() -> None:
 def test_what_is_not_proved_is_said_loudly() -> None:
     assert "NOT proved" in closing_lines(SUMMARY | {"injective": False}, 1.0, [])[2]
     assert len(closing_lines({}, 1.0, [])) == 5
+
+
+def test_points_without_blocks_have_the_volume_of_the_hull() -> None:
+    scattered = SUMMARY | {"body_volume": {"folded": None, "unfolded": None}}
+    assert "volume of the hull 1.839e+08" in closing_lines(scattered, 1.0, [])[1]
 
 
 class _Terminal(io.StringIO):

@@ -150,6 +150,11 @@ def test_summary_is_json_and_holds_the_promised_keys(swelling):
     hull = summary["hull"]
     assert hull["volume"] == pytest.approx(hull["blocks_volume"], rel=0.1)
     assert "epsilon" in repr(u)
+    # The blocks' volume, not that of the control mesh, which reaches past them.
+    volume = len(swelling) * np.prod(summary["lattice"]["steps"])
+    assert summary["body_volume"]["folded"] == pytest.approx(volume, rel=1e-9)
+    assert summary["body_volume"]["unfolded"] == pytest.approx(volume, rel=0.02)
+    assert summary["control_mesh"]["volume_folded"] > 1.05 * volume
 
 
 def test_duplicates_are_kept_and_counted(swelling):

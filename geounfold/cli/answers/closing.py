@@ -62,9 +62,10 @@ def _body(summary: Mapping[str, Any]) -> str:
         parts.append(f"{size['length']:.4g} long and {size['width']:.4g} wide when flat")
     if size.get("thickness"):
         parts.append(f"{size['thickness']:.4g} thick (median)")
-    volume = (summary.get("hull") or {}).get("volume")
-    if volume:
-        parts.append(f"volume {volume:.4g}")
+    blocks = (summary.get("body_volume") or {}).get("folded")
+    hull = (summary.get("hull") or {}).get("volume")
+    if blocks or hull:
+        parts.append(f"volume of the {'blocks' if blocks else 'hull'} {blocks or hull:.4g}")
     return ", ".join(parts) or "size not known"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +12,13 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import DomainError, GeounfoldError, InputError
-from geounfold.geometry.mesh import Ints
+from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.coordinate_columns import coordinate_columns
+from geounfold.io.messages import counted
 from geounfold.io.result_columns import UNFOLDED, result_columns
 from geounfold.io.selection import column_position, read_where
 from geounfold.io.selection.labels import codes_of
+from geounfold.io.selection.mixed import left_out
 from geounfold.io.tables.parted import spread_columns
 from geounfold.io.tables.points import chosen_rows
 from geounfold.mapping.domain_map import DomainMap
@@ -22,6 +26,9 @@ from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.unfolding.options import UnfoldOptions
 from geounfold.unfolding.result import Unfolding
 from geounfold.unfolding.run import unfold
+from geounfold.unfolding.waste import waste_domains, waste_told
+
+_log = logging.getLogger("geounfold")
 
 _MOST = 1000  # domains of a run; models have tens, a column of grades thousands
 
@@ -128,9 +135,10 @@ class Domains(Mapping[str, Unfolding]):
         if not self.results:
             raise type(self.failures[first])(f"{self.column} {first}: {self.failures[first]}")
         told = "; ".join(f"{name}: {error}" for name, error in self.failures.items())
+        rest = f'"{left_out(self.column, list(self.failures))}"'
         raise DomainError(
             f"{len(self.failures)} of {len(self.blocks)} domains failed, the others are there: "
-            f"{told}"
+            f"{told}; --where {rest} leaves out what is no body"
         )
 
 
@@ -193,9 +201,11 @@ def unfold_domains(
         return unfold(points.iloc[rows], options, progress=stage, **changes)
 
     check_domains_named(codes, names, f"column '{by}'")
+    column = str(points.columns[position])
+    for warning in model_warnings(column, codes, names, chosen, _places(points, chosen)):
+        _log.warning("%s", warning)
     results, failures, blocks = each_domain(codes, names, run, progress)
     part = parts_of_rows(codes, names, list(results), chosen)
-    column = str(points.columns[position])
     found = Domains(column, results, failures, blocks, points.copy(), part)
     if not results:
         found.check()
@@ -254,10 +264,46 @@ def check_domains_named(codes: Ints, names: list[str], column: str) -> None:
         )
 
 
+def model_warnings(
+    column: str, codes: Ints, names: list[str], chosen: Bools, points: Floats
+) -> list[str]:
+    """Return what to know of a model's domains before they are unfolded, one sentence each.
+
+    Parameters
+    ----------
+    column : str
+        Of the domains.
+    codes, chosen : (n,) int and bool
+        Domain of each row, -1 for none, and the rows chosen.
+    names : list of str
+        Names of the domains.
+    points : (k, 3) float
+        Centroids of the rows chosen.
+    """
+    counts = np.bincount(codes[codes >= 0], minlength=len(names))
+    waste = waste_domains(codes[chosen], names, points)
+    told = waste_told(column, waste, dict(zip(names, counts.tolist(), strict=True)))
+    blank = int(np.count_nonzero(chosen & (codes < 0)))
+    none = (
+        f"{counted(blank, 'row has', 'rows have')} no value in {column}, and so no domain: their "
+        "results are empty"
+    )
+    return [*([told] if told else []), *([none] if blank else [])]
+
+
 def parts_of_rows(codes: Ints, names: list[str], done: list[str], chosen: Any) -> Ints:
     """Return the position of each row's domain among those done, (n,); -1 and -2 as PartedTable."""
     place = np.array([done.index(name) if name in done else -2 for name in [*names]] + [-2])
     return np.where(chosen, place[codes], -1)
+
+
+def _places(frame: pd.DataFrame, chosen: Bools) -> Floats:
+    """Return the coordinates of rows; NaN for texts, about which their own domain fails."""
+    at = coordinate_columns([str(name) for name in frame.columns])
+    columns = (pd.to_numeric(frame.iloc[:, k], errors="coerce") for k in at)
+    return np.column_stack([column.to_numpy(np.float64, na_value=np.nan) for column in columns])[
+        chosen
+    ]
 
 
 def _result_row(name: str, u: Unfolding) -> dict[str, Any]:

@@ -72,7 +72,15 @@ def test_a_domain_that_fails_leaves_the_others_standing(folder: Path, capsys) ->
     assert main(words) == 1
     said = capsys.readouterr()
     assert "1 of 4 domains failed, the others are there: WASTE: " in said.err
-    rows = {row["domain"]: row for row in json.loads(said.out)["domains"]}
+    told = json.loads(said.out)
+    waste = (
+        "DOMAIN WASTE (11952 blocks; its name means waste) is unfolded as a body too: leave it out "
+        'by --where "DOMAIN!=WASTE"'
+    )
+    assert told["warnings"][0] == waste
+    assert said.err.index(f"warning: {waste}") < said.err.index("domains failed")
+    assert said.err.rstrip().endswith('--where "DOMAIN!=WASTE" leaves out what is no body')
+    rows = {row["domain"]: row for row in told["domains"]}
     assert rows["WASTE"]["outcome"] == "failed"
     assert rows["WASTE"]["error"]
     every, flat = pd.read_csv(out), pd.read_csv(folder / "flat.csv")

@@ -19,6 +19,7 @@ from geounfold.io import write_json
 from geounfold.io.result_columns import UNFOLDED, result_columns, world_columns
 from geounfold.io.selection import column_position
 from geounfold.io.selection.labels import codes_of
+from geounfold.io.selection.mixed import box_told, left_out
 from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def unfold_by(
         Domains,
         check_domains_named,
         each_domain,
+        model_warnings,
         parts_of_rows,
     )
 
@@ -81,8 +83,11 @@ def unfold_by(
         return unfolding.unfold(table.points[rows], options, progress=stage)
 
     check_domains_named(codes, names, f"{table.source}: column '{args.by}'")
-    results, failures, blocks = each_domain(codes, names, run, console.stage)
     column = table.names[column_position(table.names, args.by, table.source)]
+    told = model_warnings(column, codes, names, selected, table.points[selected])
+    for warning in told:  # at once: waste may take long
+        console.warn(warning)
+    results, failures, blocks = each_domain(codes, names, run, console.stage)
     part = parts_of_rows(codes, names, list(results), selected)
     found = Domains(column, results, failures, blocks, None, part)
     if not results:
@@ -91,7 +96,7 @@ def unfold_by(
     console.stage("writing")
     answer = _Answer(args, body, found, parted)
     with outputs.writing() as parts:
-        answer.write(parts)
+        answer.write(parts, told)
     for warning in answer.warnings:
         console.warn(warning)
     console.done(f"{len(results)} domains, {len(parted)} points unfolded into {args.output}")
@@ -122,7 +127,7 @@ class _Answer:
         self.warnings = [
             f"{found.column} {name}: {warning}"
             for name, summary in summaries.items()
-            for warning in summary["warnings"]
+            for warning in [*_boxed(found.column, name, summary), *summary["warnings"]]
         ] + self._carried_warnings()
         read = body.table.facts() | ({} if body.frame is None else body.frame.facts())
         first = next(iter(summaries.values()))
@@ -142,13 +147,14 @@ class _Answer:
         if body.holes is not None:
             self.summary["drillholes"] = body.holes.facts(self._holes)
 
-    def write(self, parts: Mapping[str, Path]) -> None:
-        """Write the outputs that are wanted."""
+    def write(self, parts: Mapping[str, Path], told: list[str]) -> None:
+        """Write the outputs that are wanted; ``told`` are the warnings that were given already."""
         body = self._body
         makes = [partial(self._columns, name) for name in self._found]
         self._table.write_parts(parts["--output"], *makes)
         self.summary.update(body.volumes.facts())
         self.warnings += body.volumes.warnings()
+        self.summary["warnings"] = [*told, *self.warnings]
         if body.samples is not None and "--samples-out" in parts:
             body.samples.write(parts["--samples-out"], self._samples)
         if body.holes is not None:
@@ -200,6 +206,13 @@ class _Answer:
         for name, columns in self._holes.items():
             found += outside_warnings(f"the holes' {name}", place_counts(columns))
         return found
+
+
+def _boxed(column: str, name: str, summary: Mapping[str, Any]) -> list[str]:
+    """Return the warning of a domain that fills its lattice's box; none if it does not."""
+    way_out = f'if it is no body, leave it out by --where "{left_out(column, [name])}"'
+    told = box_told(summary.get("lattice", {}).get("full_box"), way_out)
+    return [told] if told else []
 
 
 def carried_holes(

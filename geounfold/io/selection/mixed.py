@@ -51,11 +51,11 @@ def mixed_columns(names: Sequence[str], categories: Categories) -> str:
         return ""
     told = " and ".join(f"{shown(name)} ({_counted(counts)})" for name, counts in found)
     name, counts = found[0]
-    choice = f"{_quoted(name)}={_quoted(_likely(counts))}"
+    choice = f"{quoted(name)}={quoted(_likely(counts))}"
     verb = "column {} varies" if len(found) == 1 else "columns {} vary"
     return (
         f"{verb.format(told)}, and all rows were taken as one body: choose the body's rows by "
-        f'--where "{choice}", or unfold every value on its own by --by {_quoted(name)}'
+        f'--where "{choice}", or unfold every value on its own by --by {quoted(name)}'
     )
 
 
@@ -67,14 +67,16 @@ def mixed_frame(frame: pd.DataFrame) -> str:
     return mixed_columns(names, lambda name: codes_of([frame.iloc[:, names.index(name)]]))
 
 
-def box_told(sides: Sequence[int] | None) -> str:
+_OF_A_TABLE = "if waste is among them, choose the body's rows by --where COLUMN=VALUE"
+
+
+def box_told(sides: Sequence[int] | None, way_out: str = _OF_A_TABLE) -> str:
     """Return the sentence on blocks that fill the box of their lattice; empty if they do not."""
     if sides is None:
         return ""
     return (
         f"the blocks fill the whole box of their lattice ({' x '.join(map(str, sides))}), so that "
-        "no border of a body shows in them; if waste is among them, choose the body's rows by "
-        "--where COLUMN=VALUE"
+        f"no border of a body shows in them; {way_out}"
     )
 
 
@@ -91,5 +93,13 @@ def _likely(counts: dict[str, int]) -> str:
     return next((value for value in named if value.casefold() in _ORE), named[0])
 
 
-def _quoted(word: str) -> str:
+def quoted(word: str) -> str:
+    """Return a word as an expression of --where has it: in quotes if it needs them."""
     return word if re.fullmatch(r"[\w.\-+%]+", word) else f"'{word}'"
+
+
+def left_out(column: str, names: Sequence[str]) -> str:
+    """Return the expression that leaves domains out."""
+    if len(names) == 1:
+        return f"{quoted(column)}!={quoted(names[0])}"
+    return f"{quoted(column)} not in ({', '.join(quoted(name) for name in names)})"

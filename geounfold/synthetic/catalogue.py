@@ -439,6 +439,7 @@ def simulate(case: str | FoldSpec, *, blocks: int | None = None, **overrides: ob
     if isinstance(case, str) and case not in CASES:
         raise OptionError(
             f"no simulated body is named {case!r}{nearest(case, CASES)}; valid: {', '.join(CASES)}"
+            "; simulate_faulted makes those with faults"
         )
     spec = CASES[case] if isinstance(case, str) else case
     spec = spec.with_options(**overrides)

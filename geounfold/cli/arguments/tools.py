@@ -33,7 +33,7 @@ def add_simulate(commands: Any) -> Parser:
         examples=(
             "geounfold simulate --list",
             "geounfold simulate plunging -o blocks.csv",
-            "geounfold simulate graben -o graben.csv --faults-out graben.ts",
+            "geounfold simulate horst -o horst.csv --faults-out horst.ts",
         ),
     )
     group = parser.section("body")
@@ -43,12 +43,13 @@ def add_simulate(commands: Any) -> Parser:
     group.add(
         "--faults-out",
         metavar="F",
-        help="the surfaces of a faulted body, a file each: graben_f1.ts, ... of graben.ts",
+        help="the surfaces of a faulted body, a file each: horst_f1.ts, ... of horst.ts",
     )
     group.add(
         "--blocks",
         metavar="N",
-        help="scale the body in its plane to about N blocks; of a faulted body, scale the blocks",
+        help="scale the body in its plane, not its thickness, to about N blocks; of a faulted "
+        "body, scale the blocks",
     )
     return parser
 

@@ -23,6 +23,8 @@ from geounfold.io.formats.registry import check_library_of
 from geounfold.io.messages import shown
 from geounfold.io.paths import ending
 
+_SOME = 4  # endings that a message names
+
 
 class Watcher(Protocol):
     """Is called as outputs are written, so that an interrupted run leaves nothing behind."""
@@ -94,8 +96,8 @@ class Outputs:
             A target's format needs a library that is not installed.
         """
         targets = {
-            name: _target(name, Path(path), endings)
-            for name, (path, endings) in wanted.items()
+            name: _target(name, Path(path), {n: endings for n, (_, endings) in wanted.items()})
+            for name, (path, _) in wanted.items()
             if path is not None
         }
         sources = [Path(p) for p in inputs]
@@ -230,8 +232,8 @@ def _check_folder(target: Path, overwrite: bool) -> None:
         raise OutputError(f"{target}: the folder exists already; --overwrite replaces it")
 
 
-def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
-    """Return the path that links lead to, after checking its ending."""
+def _target(name: str, path: Path, every: Mapping[str, tuple[str, ...]]) -> Path:
+    """Return the path that links lead to, after checking its ending among those of the option."""
     if fault := files.fault_of_name(path):
         raise OutputError(f"{name}: '{shown(path)}': {fault} on this system; choose another")
     try:
@@ -241,10 +243,20 @@ def _target(name: str, path: Path, endings: tuple[str, ...]) -> Path:
         raise OutputError(f"{name}: '{shown(path)}' is not a valid path: {error}") from error
     if is_folder:
         raise OutputError(f"{path}: {name} is a directory, not a file")
-    if endings and ending(path) not in endings:
-        raise OutputError(f"{path}: {name} must end in {' or '.join(endings)}")
+    if every[name] and ending(path) not in every[name]:
+        raise OutputError(f"{path}: {_must_end(name, ending(path), every)}")
     check_library_of(ending(path))
     return target
+
+
+def _must_end(name: str, kind: str, every: Mapping[str, tuple[str, ...]]) -> str:
+    """Return how an output must end, and which option the ending given belongs to."""
+    endings = every[name]
+    some = " or ".join(endings)
+    if len(endings) > _SOME:
+        some = f"{', '.join(endings[:_SOME])} or another kind of table"
+    other = next((n for n, ends in every.items() if kind and kind in ends), None)
+    return f"{name} must end in {some}" + (f"; {kind} is for {other}" if other else "")
 
 
 def _check_replaceable(target: Path, overwrite: bool) -> None:

@@ -15,7 +15,7 @@ from geounfold.io.coordinate_columns import coordinate_columns, numbers
 from geounfold.io.formats import Surface, find_format, point_endings, surface_endings
 from geounfold.io.formats.elements import Kind, chosen
 from geounfold.io.messages import listing, no_elements, rows_named
-from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file
+from geounfold.io.paths import TABLE_ENDINGS, ending, existing_file, wrong_kind
 from geounfold.io.tables.files import Table, read_table, write_table
 from geounfold.io.tables.points import PointTable, read_points
 
@@ -61,9 +61,8 @@ def read_surface_with_meta(
     kind = ending(path)
     existing_file(path)
     if kind not in SURFACE_ENDINGS:
-        raise InputError(
-            f"{path}: unknown kind of surface '{kind}'; files end in {', '.join(SURFACE_ENDINGS)}"
-        )
+        usual = (".dxf", ".ts", ".stl", ".obj", ".ply", ".omf")
+        raise InputError(wrong_kind(path, "surface", (*usual, *SURFACE_ENDINGS)))
     meta: Mapping[str, str] = {}
     try:
         found = find_format(kind, "reads_surface")

@@ -237,7 +237,8 @@ def arrays_of(content: bytes, path: Path) -> Arrays:
     except InputError:  # a ValueError too
         raise
     except _DAMAGE as error:
-        raise InputError(f"{path}: not a geounfold map, or a damaged one; save it again") from error
+        told = "not a geounfold map, or a damaged one; save it again"
+        raise InputError(f"{path}: {told if _named_so(path) else _NO_MAP}") from error
     stored = rest.pop("checksum")
     if str(stored) != _checksum({**head, **rest}):
         raise InputError(f"{path}: the map file is damaged (checksum differs); save it again")
@@ -376,7 +377,15 @@ def _wrong(source: str, name: str, must: str) -> InputError:
 
 
 def _foreign(path: Path) -> InputError:
-    return InputError(f"{path}: not a geounfold map; write one with geounfold unfold --map")
+    told = "not a geounfold map; write one with geounfold unfold --map"
+    return InputError(f"{path}: {told if _named_so(path) else _NO_MAP}")
+
+
+_NO_MAP = "not a geounfold map, which ends in .npz: were two files swapped?"
+
+
+def _named_so(path: Path) -> bool:
+    return path.suffix.lower() == ".npz"
 
 
 def _checksum(arrays: Mapping[str, NDArray[Any]]) -> str:

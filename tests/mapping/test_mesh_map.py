@@ -99,3 +99,6 @@ def test_damaged_foreign_and_newer_files_are_refused(tmp_path):
     }.items():
         with pytest.raises(InputError, match=words):
             load(tmp_path / f"{name}.npz")
+    (tmp_path / "blocks.csv").write_text("x,y,z\n1,2,3\n")
+    with pytest.raises(InputError, match=r"which ends in .npz: were two files swapped"):
+        load(tmp_path / "blocks.csv")

@@ -13,9 +13,9 @@ from geounfold.cli.domains.maps import domains_of, load_map
 from geounfold.cli.inputs.points import files_given, read_all, read_samples
 from geounfold.cli.inputs.unfold_options import command_line
 from geounfold.cli.terminal.console import Console
-from geounfold.errors import OptionError
+from geounfold.errors import InputError, OptionError
 from geounfold.io import Outputs, write_json
-from geounfold.io.paths import existing_file
+from geounfold.io.paths import SWAPPED, existing_file
 from geounfold.io.tables.parted import PartedTable
 
 if TYPE_CHECKING:
@@ -44,6 +44,11 @@ def run(args: Namespace, console: Console) -> None:
     samples = read_samples(args, console)
     if samples is None:
         raise OptionError("estimate needs SAMPLES")
+    if args.grade not in list(samples.frame.columns) and args.grade in whole.names:
+        raise InputError(
+            f"{args.samples}: no column '{args.grade}', but {args.points} has it: {SWAPPED} "
+            "SAMPLES comes before BLOCKS"
+        )
     saved = load_map(args)
     several = domains_of(saved)
     if several is not None:

@@ -106,6 +106,11 @@ def _carry_points(
     if args.points is not None:
         prefer = (UNFOLDED,) if args.inverse else ()
         opened = open_table(args, console, prefer, frame=frame, keep=several is not None)
+        if args.inverse and args.columns is None and tuple(opened.columns) != UNFOLDED:
+            console.note(
+                f"{args.points}: no columns {', '.join(UNFOLDED)}: {', '.join(opened.columns)} "
+                "were taken as coordinates in the flat space"
+            )
         if several is None:
             table = PartedTable.chosen(opened)
             carryings = [_Carrying(cast("UnfoldingMap", saved), frame, args)]

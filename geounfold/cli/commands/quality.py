@@ -5,12 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
+import numpy as np
+
 from geounfold.cli.answers.file_endings import JSON
 from geounfold.cli.inputs.numbers import whole_number
 from geounfold.cli.inputs.points import TRUE, files_given, triple, where_of
 from geounfold.cli.terminal.console import Console
 from geounfold.errors import InputError
 from geounfold.io import Outputs, read_points, write_json
+from geounfold.io.paths import SWAPPED
 from geounfold.io.result_columns import UNFOLDED
 
 
@@ -52,6 +55,11 @@ def run(args: Namespace, console: Console) -> None:
     with outputs.writing() as parts:
         if "--output" in parts:
             write_json(parts["--output"], figures)
+    if np.array_equal(folded.points, unfolded.points):
+        console.warn(
+            f"{unfolded.source} has the same coordinates as {folded.source}: nothing was unfolded; "
+            f"{SWAPPED}"
+        )
     console.done("measured")
     console.answer(figures, lambda: "".join(_figure_lines(figures)))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from geounfold.backends.system.files import same_file
 from geounfold.errors import InputError, OptionError
 
 if TYPE_CHECKING:
@@ -30,6 +31,9 @@ def check_fault_options(args: Namespace) -> None:
                 flag = f"--{name.replace('_', '-')}"
                 raise OptionError(f"{flag} is of faults: give --faults or --fault-blocks too")
         return
+    for path in args.faults or ():
+        if args.points is not None and same_file(Path(path), Path(args.points)):
+            raise OptionError(f"--faults {path} is POINTS itself: give the surface of a fault")
     if args.by is not None:
         raise OptionError(
             "--by unfolds domains one by one, --faults and --fault-blocks join the blocks of one: "

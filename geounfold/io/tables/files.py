@@ -25,7 +25,7 @@ from geounfold.errors import InputError, OutputError
 from geounfold.io.column_values import TextKind, typed_values
 from geounfold.io.messages import no_elements, shown
 from geounfold.io.packages.names import Triple
-from geounfold.io.paths import TABLE_ENDINGS, TEXT_ENDINGS, ending, existing_file
+from geounfold.io.paths import TABLE_ENDINGS, TEXT_ENDINGS, ending, existing_file, wrong_kind
 from geounfold.io.tables.csv_text import csv_reader, csv_text, named_frame, text_content
 from geounfold.io.tables.encoding import as_utf8, encoding_note, text_encoding
 from geounfold.io.tables.layout import TextLayout, text_layout
@@ -113,8 +113,8 @@ def _read_format(path: Path, kind: str, element: str | None) -> Table:
 
     found = find_format(kind, "reads_points")
     if found is None:
-        endings = ", ".join(dict.fromkeys((*TABLE_ENDINGS, *TEXT_ENDINGS, *point_endings())))
-        raise InputError(f"{path}: unknown kind of table '{kind}'; files end in {endings}")
+        usual = (*TABLE_ENDINGS, ".txt", ".gslib", ".vtu")
+        raise InputError(wrong_kind(path, "points", (*usual, *point_endings())))
     module = found.load()
     if element is not None and not found.elements:
         raise no_elements(path)

@@ -33,5 +33,8 @@ def test_map_there_and_back(
     # The unfolded columns are those meant on the way back, though XC/YC/ZC are there too.
     assert main(["map", "m.npz", "flat.csv", "--inverse", "-o", "back2.csv"]) == 0
     assert (tmp_path / "back2.csv").read_text() == (tmp_path / "back.csv").read_text()
+    capsys.readouterr()
+    assert main(["map", "m.npz", "p.csv", "--inverse", "-o", "back3.csv"]) == 0
+    assert "note: p.csv: no columns unfolded_x, unfolded_y" in capsys.readouterr().err
     assert main(f"map m.npz flat.csv --columns {columns} -o no.csv".split()) == 2
     assert not (tmp_path / "no.csv").exists()

@@ -11,6 +11,7 @@ import pytest
 
 from geounfold.cli import main
 from tests.cli.fakes import RESULTS
+from tests.shapes import grid_cells
 
 
 def test_quality(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -34,3 +35,27 @@ def test_quality(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr().out
     assert "neighbours" in out
     assert "epsilon_own_neighbours" in out
+
+
+def test_files_in_each_others_place_are_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    cells = pd.DataFrame(grid_cells(5, 4, 3) * 1.0, columns=list("xyz"))
+    cells.to_csv("folded.csv", index=False)
+    flat = (cells * [2.0, 1, 1]).set_axis(list(RESULTS[:3]), axis=1)
+    flat.to_csv("flat.csv", index=False)
+    assert main(["quality", "folded.csv", "folded.csv"]) == 0
+    said = capsys.readouterr().err
+    assert "has the same coordinates as folded.csv: nothing was unfolded; were two files" in said
+    assert main(["quality", "folded.csv", "flat.csv"]) == 0
+    assert capsys.readouterr().err == ""
+    for words, message in (
+        ("map folded.csv flat.csv -o o.csv", "not a geounfold map, which ends in .npz: were two"),
+        ("unfold folded.csv -o s.json", "--output must end in .csv, .csv.gz, .parquet, .gslib or "
+         "another kind of table; .json is for --summary"),
+        ("unfold folded.csv -o o.csv --map m.csv", "--map must end in .npz; .csv is for --output"),
+        ("unfold folded.csv -o o.csv --faults folded.csv", "--faults folded.csv is POINTS itself"),
+    ):  # fmt: skip
+        assert main(words.split()) == 2
+        said = capsys.readouterr().err
+        assert message in said
+        assert said.count("\n") == 1

@@ -204,9 +204,21 @@ def test_damaged_surfaces_are_one_line(name: str, content: bytes, tmp_path: Path
 def test_unknown_endings(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="unknown kind of surface"):
         write_surface(tmp_path / "s.unknown", tetrahedron())
-    (tmp_path / "p.unknown").write_text("1 2 3")
-    with pytest.raises(InputError, match=r"unknown kind of table '.unknown'.*\.gslib"):
-        read_points(tmp_path / "p.unknown")
+    said = {
+        "p.unknown": r"the ending '.unknown' is none of the kinds that points .*: .*\.gslib",
+        "p": "a file without an ending is none of the kinds that points are read from: .csv",
+        "m.npz": "is a map of geounfold, and holds no points: were two files swapped",
+        "s.json": "is a JSON file, such as a summary, and holds no points: were two files swapped",
+        "b.xlsx": "is a spreadsheet: save the sheet as .csv",
+        "b.dm": "is of a closed format: export it as .csv",
+    }
+    for name, message in said.items():
+        (tmp_path / name).write_text("1 2 3")
+        with pytest.raises(InputError, match=rf"{name}: {message}") as caught:
+            read_points(tmp_path / name)
+        assert len(str(caught.value).removeprefix(str(tmp_path))) < 170
+    with pytest.raises(InputError, match=r"s.json: is a JSON file.* holds no surface: were two"):
+        read_surface(tmp_path / "s.json")
 
 
 def test_several_objects_of_different_systems(tmp_path: Path) -> None:

@@ -20,8 +20,11 @@ from geounfold.io.column_values import objects
 from geounfold.io.coordinate_columns import number_hint, readable_numbers
 from geounfold.io.messages import listing, shown
 from geounfold.io.selection import nearest_name
+from geounfold.io.selection.mixed import is_rock
 
 BELOW_DETECTION = ("missing", "half", "zero")
+
+_CODES = 40  # kinds of rock at most: more are numbers of another kind
 
 _BELOW = re.compile(r"<\s*=?\s*(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?)", re.IGNORECASE)
 _PERCENTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?|100)", re.IGNORECASE)
@@ -220,6 +223,11 @@ class GradeValues:
         known = np.count_nonzero(np.isfinite(self.values) | self.below | self.declared)
         if 2 * len(bad) <= known + len(bad):
             return
+        if not known:
+            raise InputError(
+                f"{source}: column '{shown(column.name)}' holds words, such as "
+                f"{listing(self._words(column)[:3])}, and no number: it is no grade"
+            )
         row = bad[0] + 1 if rows is None else rows[bad[0]]
         words = self._words(column)
         first = str(objects(column)[bad[0]]).strip()
@@ -233,7 +241,7 @@ class GradeValues:
     def messages(self, column: pd.Series, source: str) -> list[str]:
         """Return one line for each kind of value that is not a plain number."""
         name, text = shown(column.name), objects(column)
-        lines = []
+        lines = [self._coded_told(name, source)] if self._coded(name) else []
         rest = (
             (self.below, "below detection", self._below_told()),
             (self.wrong, "no numbers", "taken as missing; declare codes by --missing"),
@@ -249,6 +257,19 @@ class GradeValues:
                     f"'{shown(str(text[at[0]]).strip())}' at data row {at[0] + 1}: {done}"
                 )
         return lines
+
+    def _coded(self, name: str) -> bool:
+        """Return whether the values are few whole numbers, in a column that is named for rock."""
+        kinds = np.unique(self.values[np.isfinite(self.values)])
+        return is_rock(name) and len(kinds) <= _CODES and bool((kinds == np.rint(kinds)).all())
+
+    def _coded_told(self, name: str, source: str) -> str:
+        kinds = np.unique(self.values[np.isfinite(self.values)])
+        return (
+            f"{source}: column '{name}' holds {len(kinds)} whole numbers "
+            f"({listing(f'{kind:g}' for kind in kinds)}) and is named as a code of rock is: a mean "
+            "of codes is no grade; --samples-where chooses samples by it"
+        )
 
     def _below_told(self) -> str:
         rule = self.rules.below_detection
@@ -301,6 +322,17 @@ def grade_of(
         lines.append(f"{source}: {capped}")
         facts["cap"] = capped.__dict__
     return values, lines, facts
+
+
+def grades_of(frame: pd.DataFrame) -> list[str]:
+    """Return the columns of a table that may be grades: half of their values are numbers."""
+    found = []
+    for k, name in enumerate(frame.columns):
+        values, wrong = readable_numbers(frame.iloc[:, k])
+        known = np.isfinite(values) & ~wrong
+        if known.any() and 2 * np.count_nonzero(wrong) <= np.count_nonzero(wrong | known):
+            found.append(str(name))
+    return found
 
 
 def grade_rules(given: GradeRules | Mapping[str, Any] | None) -> GradeRules:

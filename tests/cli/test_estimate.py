@@ -325,6 +325,28 @@ def test_negative_grades_are_told_and_words_are_refused(model, tmp_path: Path, c
     assert "the first 'BDL' at data row 2" in said
 
 
+def test_columns_of_rock_are_no_grades(model, tmp_path: Path, capsys) -> None:
+    samples = pd.read_csv(model / "s.csv")
+    samples["ZONE"] = np.where(samples["x"] > 100, "OX", "SUL")
+    samples["ROCK CODE"] = np.where(samples["x"] > 100, 1, 2)
+    samples.to_csv(model / "rock.csv", index=False)
+    words = estimated(model, tmp_path / "o.csv", samples="rock.csv")
+    words[words.index("--grade") + 1] = "ZONE"
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "column 'ZONE' holds words, such as SUL, OX, and no number: it is no grade; col" in said
+    assert re.search(r"columns of numbers: .*\bAU\b.*; --samples-where \"ZONE=...\" chooses", said)
+    assert said.count("\n") == 1
+    words[2:4] = reversed(words[2:4])  # BLOCKS before SAMPLES
+    assert main(words) == 2
+    assert "rock.csv has it: were two files swapped? SAMPLES comes" in capsys.readouterr().err
+    words[2:4] = reversed(words[2:4])
+    words[words.index("--grade") + 1] = "ROCK CODE"
+    assert main(words) == 0
+    said = capsys.readouterr().err
+    assert "column 'ROCK CODE' holds 2 whole numbers (1, 2) and is named as a code of rock" in said
+
+
 def test_caps_and_declustering_are_in_the_summary(model, tmp_path: Path, capsys) -> None:
     samples = pd.read_csv(model / "s.csv")
     ore = samples.index[samples["ORE"]]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from geounfold.cli.inputs.numbers import number, three_numbers, whole_number
-from geounfold.cli.inputs.values import values_rules
+from geounfold.cli.inputs.values import no_grade, values_rules
 from geounfold.errors import InputError, OptionError
 from geounfold.io.paths import existing_file
 
@@ -93,6 +93,10 @@ def sample_table(samples: PointTable, args: Namespace) -> pd.DataFrame:
     if args.grade in (*samples.columns, *"xyz", "hole"):
         raise OptionError(f"--grade {args.grade} names a coordinate or the holes")
     grade = samples.column(args.grade)
+    try:
+        values_rules(args).read(grade).check(grade, samples.source)
+    except InputError as error:
+        raise no_grade(error, samples, args, args.grade) from error
     columns: dict[str, Any] = dict(zip("xyz", samples.points.T, strict=True))
     hole = args.hole or _hole(samples)
     if hole is not None:

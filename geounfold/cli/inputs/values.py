@@ -6,7 +6,9 @@ import csv
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from geounfold.errors import OptionError
+from geounfold.errors import InputError, OptionError
+from geounfold.io.messages import listing
+from geounfold.io.selection.mixed import quoted
 
 if TYPE_CHECKING:
     from geounfold.cli.terminal.console import Console
@@ -45,6 +47,19 @@ def values_rules(args: Namespace) -> GradeRules:
         raise OptionError(f"--cap: {error}") from error
 
 
+def no_grade(error: InputError, table: PointTable, args: Namespace, name: str) -> InputError:
+    """Return the error of a column of words, with the columns that may be grades."""
+    if "it is no grade" not in str(error):
+        return error
+    from geounfold.io.grade_values import grades_of
+
+    rest = table.frame.drop(columns=[*table.columns, name], errors="ignore")
+    found = grades_of(rest)
+    told = f"; columns of numbers: {listing(found)}" if found else ", and no other column has any"
+    chooses = f'; --samples-where "{quoted(name)}=..." chooses samples by it'
+    return InputError(f"{error}{told}{chooses if hasattr(args, 'samples_where') else ''}")
+
+
 def read_grade(
     table: PointTable,
     name: str,
@@ -61,7 +76,10 @@ def read_grade(
     """
     from geounfold.io.grade_values import grade_of
 
-    values, lines, _ = grade_of(table.column(name), table.source, rules or values_rules(args))
+    try:
+        values, lines, _ = grade_of(table.column(name), table.source, rules or values_rules(args))
+    except InputError as error:
+        raise no_grade(error, table, args, name) from error
     for line in lines:
         console.warn(line)
     return values

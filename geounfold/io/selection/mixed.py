@@ -38,7 +38,7 @@ def mixed_columns(names: Sequence[str], categories: Categories) -> str:
     """
     found = []
     for name in names:
-        if not _NAMES.fullmatch(plain_name(name)):
+        if not is_rock(name):
             continue
         codes, values = categories(name)
         counts = {v: int(np.count_nonzero(codes == k)) for k, v in enumerate(values)}
@@ -57,6 +57,17 @@ def mixed_columns(names: Sequence[str], categories: Categories) -> str:
         f"{verb.format(told)}, and all rows were taken as one body: choose the body's rows by "
         f'--where "{choice}", or unfold every value on its own by --by {quoted(name)}'
     )
+
+
+def is_rock(name: object) -> bool:
+    """Return whether a column is named as one of rock, ore or domain is.
+
+    Examples
+    --------
+    >>> is_rock("ZONE_CODE"), is_rock("AU")
+    (True, False)
+    """
+    return _NAMES.fullmatch(plain_name(name)) is not None
 
 
 def mixed_frame(frame: pd.DataFrame) -> str:

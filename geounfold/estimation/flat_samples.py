@@ -19,6 +19,8 @@ from geounfold.io.packages.names import plain_name
 from geounfold.io.result_columns import frame_points
 from geounfold.mapping.carried import Carried, checked_points
 
+_BESIDE = 0.5 - 1e-9  # blocks; a sample in the middle of the next cell lies at 0.5
+
 
 class Carries(Protocol):
     """An object that carries points to the unfolded space, such as an UnfoldingMap."""
@@ -54,6 +56,9 @@ class FlatSamples:
         Number left out because they lie outside the map.
     wall_rock : int
         Number left out because they lie outside the body.
+    beside : int
+        Number of those within half a block of it: of blocks that are whole or absent, some of the
+        body's own samples lie there.
     let_in : int
         Number used although they lie outside the body, within the soft boundary.
     lines : tuple of str
@@ -72,6 +77,7 @@ class FlatSamples:
     without_grade: int
     outside: int
     wall_rock: int = 0
+    beside: int = 0
     let_in: int = 0
     lines: tuple[str, ...] = ()
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -84,6 +90,7 @@ class FlatSamples:
             "without_grade": self.without_grade,
             "outside_map": self.outside,
             "outside_body": self.wall_rock,
+            "outside_body_within_half_a_block": self.beside,
             "soft_boundary": self.let_in,
             "values": dict(self.values),
         }
@@ -98,7 +105,7 @@ class FlatSamples:
         if self.wall_rock:
             lines.append(
                 f"{self.wall_rock} of {self.given} samples lie outside the body (wall rock): left "
-                "out; --soft-boundary B lets in those within B blocks"
+                f"out{self._let_in_by()}"
             )
         if self.let_in:
             lines.append(
@@ -106,6 +113,16 @@ class FlatSamples:
                 "boundary: used"
             )
         return lines
+
+    def _let_in_by(self) -> str:
+        """Return how to let in samples outside the body."""
+        if not self.beside:
+            return "; --soft-boundary B lets in those within B blocks"
+        share = self.beside / self.wall_rock
+        return (
+            f"; {self.beside} of them ({share:.0%}) lie within half a block of it, where the edges "
+            "of whole blocks cut off samples of the body too: --soft-boundary 0.5 lets these in"
+        )
 
 
 def flat_samples(
@@ -153,11 +170,12 @@ def flat_samples(
         raise InputError(f"no sample has a value of '{grade}' and coordinates")
     carried = carrier.carry(checked_points(P[rows]))
     inside = np.isfinite(carried.points).all(axis=1)
-    used, soft = inside, np.zeros(len(rows), dtype=bool)
+    used, soft, beside = inside, np.zeros(len(rows), dtype=bool), 0
     if soft_boundary is not None:
-        own = in_body(carrier, P[rows], carried)
-        near = own | (body_distance(carrier, P[rows], carried) <= soft_boundary)
+        own, off = in_body(carrier, P[rows], carried), body_distance(carrier, P[rows], carried)
+        near = own | (off <= soft_boundary)
         used, soft = inside & near, inside & near & ~own
+        beside = int(np.count_nonzero(inside & ~near & (off < _BESIDE)))
     if not used.any():
         raise _none_used(carrier, P[rows], carried)
     kept = rows[used]
@@ -172,6 +190,7 @@ def flat_samples(
         without_grade=int(len(samples) - len(rows)),
         outside=int(np.count_nonzero(~inside)),
         wall_rock=int(np.count_nonzero(inside & ~used)),
+        beside=beside,
         let_in=int(np.count_nonzero(soft)),
         lines=tuple(lines),
         values=facts,

@@ -175,8 +175,7 @@ def assess(
             "assess needs to know the holes: give the name of the samples' hole column"
         )
     holes = hole_numbers(flat.holes)
-    if holes.max() < 2:
-        raise InputError(f"assess needs samples of three holes or more, not {holes.max() + 1}")
+    check_three_holes(int(holes.max()) + 1, "in the body")
     model = variogram
     if model is None:
         model = fit_variogram(
@@ -267,6 +266,12 @@ def points_in_body(carrier: Any, around: Floats) -> Floats:
     if count < _TARGETS // 4:
         raise InputError("too little of the body lies in the box around it to assess it")
     return np.concatenate(found)[:_TARGETS]
+
+
+def check_three_holes(count: int, which: str) -> None:
+    """Raise InputError if so many holes are too few to assess a body by."""
+    if count < 3:
+        raise InputError(f"assess needs samples of three holes or more {which}, not of {count}")
 
 
 def spacing_of(flat: Floats, holes: Ints) -> float:

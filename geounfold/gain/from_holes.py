@@ -16,6 +16,7 @@ from geounfold.gain.assessment import Assessment, assessed, points_in_body, spac
 from geounfold.gain.trial import Trial, Tried
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.io.grade_values import GradeRules, grade_rules
+from geounfold.io.messages import counted
 
 DRAWS = 2000
 """Draws of holes with replacement, from which the intervals come."""
@@ -122,16 +123,24 @@ def study_holes(
             raise InputError("the holes are not known: give the name of the samples' hole column")
         own, there = places_of(carrier, flat.folded)
         numbers, v = hole_numbers(flat.holes[there]), flat.grades[there]
-        if numbers.max() + 1 < _FEWEST_HOLES:
-            raise InputError(
-                f"{grade}: {numbers.max() + 1} holes in the body; a comparison by left-out holes "
-                f"needs {_FEWEST_HOLES}"
-            )
+        check_enough_holes(grade, int(numbers.max()) + 1, "with samples in the body")
         found = _tried(own, numbers, v)
         rows += _rows(grade, found, v, numbers)
         targets = places_of(carrier, points_in_body(carrier, flat.folded))[0]
         told[grade] = assessed(own, numbers, v, targets, found["unfolded"].model, flat)
     return HolesStudy(pd.DataFrame(rows), told, tuple(dict.fromkeys(lines)))
+
+
+def check_enough_holes(grade: str, count: int, which: str) -> None:
+    """Raise InputError if so many holes are too few for a comparison that leaves out each in turn.
+
+    ``which`` says what holes were counted.
+    """
+    if count < _FEWEST_HOLES:
+        raise InputError(
+            f"{grade}: {counted(count, 'hole')} {which}, but a comparison that leaves out whole "
+            f"holes needs {_FEWEST_HOLES}; assess foretells the gain from three holes on"
+        )
 
 
 def _tried(own: Places, holes: Ints, values: Floats) -> Mapping[str, Tried]:

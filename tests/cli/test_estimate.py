@@ -12,6 +12,8 @@ import pytest
 
 import geounfold as gu
 from geounfold.cli import main
+from geounfold.estimation import Scores, flat_samples
+from geounfold.estimation.scores import cross_validation_told
 from geounfold.synthetic import GradeField, drill
 from tests.shapes import grid_cells
 
@@ -263,12 +265,53 @@ def test_samples_in_wall_rock_are_left_out(model, tmp_path: Path, capsys) -> Non
     assert facts["samples"]["used"] == ore.sum()
     assert facts["samples"]["outside_body"] + facts["samples"]["outside_map"] == (~ore).sum()
     assert facts["mean_of_blocks"] == 1.0  # every sample of ore is 1 g/t
-    assert "samples lie outside the body (wall rock): left out" in capsys.readouterr().err
+    # They lie in the middle of the cells of waste: half a block off, none nearer.
+    said = capsys.readouterr().err
+    assert "samples lie outside the body (wall rock): left out; --soft-boundary B lets in" in said
     more = ("--summary", s, "--overwrite", "--soft-boundary", "1")
     assert main(estimated(model, tmp_path / "o.csv", *more)) == 0
     soft = json.loads(Path(s).read_text())
     assert soft["samples"]["soft_boundary"] > 0
     assert soft["mean_of_blocks"] < 1
+
+
+def test_samples_just_outside_whole_blocks_are_counted_apart(model) -> None:
+    samples = pd.read_csv(model / "s.csv")
+    ore = samples[samples["ORE"]]
+    # One more sample under every hole's lowest block of ore, 3 of 10 m below its lower face.
+    below = ore.sort_values("z").groupby("hole").head(1).assign(z=lambda lowest: lowest["z"] - 8)
+    both = pd.concat([ore, below])
+    found = flat_samples(gu.load(model / "m.npz"), both, grade="AU", soft_boundary=0.0)
+    assert len(below) == found.wall_rock == found.beside == 24
+    assert found.facts()["outside_body_within_half_a_block"] == 24
+    (line,) = found.warnings("AU")
+    assert "; 24 of them (100%) lie within half a block of it" in line
+    assert line.endswith("--soft-boundary 0.5 lets these in")
+    soft = flat_samples(gu.load(model / "m.npz"), both, grade="AU", soft_boundary=0.5)
+    assert (soft.let_in, soft.wall_rock, soft.beside) == (24, 0, 0)
+
+
+def test_an_estimate_that_tells_nothing_is_warned_of(model, tmp_path: Path, capsys) -> None:
+    samples = pd.read_csv(model / "s.csv")
+    samples["AU"] = np.random.default_rng(3).normal(2, 1, len(samples)).round(3)
+    samples.to_csv(model / "noise.csv", index=False)
+    s = ("--cross-validate", "--summary", str(tmp_path / "s.json"))
+    assert main(estimated(model, tmp_path / "o.csv", *s, samples="noise.csv")) == 0
+    told = capsys.readouterr().err
+    # 24 holes: chance gives up to 1 / sqrt(24).
+    assert "; below 0.2, for so many holes, it may be chance: the estimates tell next to" in told
+    assert "warning: cross-validation: the estimates at" in told
+    facts = json.loads((tmp_path / "s.json").read_text())
+    assert abs(facts["cross_validation"]["correlation"]) < 0.2
+    assert facts["warnings"][-1].startswith("cross-validation: ")
+    good, poor = cross_validation_told(Scores(100, 0, 0.3, 0.0, 1.0, 0.61), 25)
+    assert not poor
+    assert good == (
+        "cross-validation: the estimates at 100 samples of 25 left-out holes have a correlation "
+        "of 0.61 with the grades and a root mean square error of 0.3"
+    )
+    # Estimates that are all the same have no correlation.
+    assert cross_validation_told(Scores(9, 0, 0.3, 0.0, 1.0, float("nan")), 25)[1]
 
 
 def test_samples_that_all_lie_outside_are_an_error(model, tmp_path: Path, capsys) -> None:

@@ -117,9 +117,9 @@ def test_left_out_holes_favour_what_is_true(flat: tuple) -> None:
 def test_too_few_holes_are_refused(flat: tuple) -> None:
     _, u, samples = flat
     few = samples[samples["hole"].isin(samples["hole"].unique()[:2])]
-    with pytest.raises(InputError, match="three holes or more, not 2"):
+    with pytest.raises(InputError, match="three holes or more in the body, not of 2"):
         gu.assess(u, few, grade="grade")
-    with pytest.raises(InputError, match="2 holes in the body"):
+    with pytest.raises(InputError, match="2 holes with samples in the body, but a"):
         gu.study_holes(u, few, ["grade"])
     with pytest.raises(InputError, match="hole column"):
         gu.assess(u, samples.drop(columns="hole"), grade="grade")
@@ -167,6 +167,27 @@ def test_the_page_of_a_study_loads_nothing(files: Path, capsys: pytest.CaptureFi
     first = page.read_bytes()
     assert main([*argv, "--overwrite"]) == 0
     assert page.read_bytes() == first
+
+
+def test_too_few_holes_are_told_before_the_body_is_read(files: Path, tmp_path, capsys) -> None:
+    # The body is no map: an error about the holes shows that it was not reached.
+    (tmp_path / "body.npz").write_text("none")
+    for name in ("collar", "survey", "assay"):
+        table = pd.read_csv(files / f"{name}.csv")
+        some = table["hole"].isin(sorted(table["hole"].unique())[:6])
+        table[some].to_csv(tmp_path / f"{name}.csv", index=False)
+    tables = [str(tmp_path / f"{name}.csv") for name in ("collar", "survey", "assay")]
+    argv = ["study-holes", *tables, "--body", str(tmp_path / "body.npz"), "--grade", "grade"]
+    assert main([*argv, "-o", str(tmp_path / "p.html")]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert (
+        "grade: 6 holes with values, but a comparison that leaves out whole holes needs 10" in said
+    )
+    samples = pd.read_csv(files / "samples.csv")
+    samples[samples["hole"] == samples["hole"].iloc[0]].to_csv(tmp_path / "s.csv", index=False)
+    argv = ["assess", str(tmp_path / "body.npz"), str(tmp_path / "s.csv"), "--grade", "grade"]
+    assert main(argv) == 2
+    assert "three holes or more with values, not of 1" in capsys.readouterr().err
 
 
 BAD = [

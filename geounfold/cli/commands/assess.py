@@ -26,6 +26,12 @@ def run(args: Namespace, console: Console) -> None:
     if samples is None:
         raise OptionError("assess needs SAMPLES")
     table = sample_table(samples, args)
+    if "hole" in table.columns:  # before the body is unfolded, which takes its time
+        from geounfold.gain.assessment import check_three_holes
+
+        check_three_holes(
+            int(table.loc[table[args.grade].notna(), "hole"].nunique()), "with values"
+        )
     saved = carrier_of(args.body, args, console)
     console.stage("assessing")
     from geounfold.gain import assess

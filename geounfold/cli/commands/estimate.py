@@ -61,7 +61,8 @@ def run(args: Namespace, console: Console) -> None:
     table = PartedTable.chosen(whole)
     one = cast("UnfoldingMap", saved)
     result = estimation(args, one, samples, table.points, console.stage)
-    summary = {**summarised(args, result, console.stage), "command": command_line(args)}
+    facts = summarised(args, result, console.stage, console.note)
+    summary = {**facts, "command": command_line(args)}
     with outputs.writing() as parts:
         table.write(parts["--output"], result.columns)
         if "--summary" in parts:
@@ -74,7 +75,7 @@ def run(args: Namespace, console: Console) -> None:
             )
         if "--report" in parts:
             write_estimate_report(parts["--report"], summary, result, one, table, samples)
-    for warning in result.warnings():
+    for warning in facts["warnings"]:
         console.warn(warning)
     known = result.blocks.counts()["estimated"]
     console.done(f"{args.grade} estimated on {known} of {len(table)} blocks into {args.output}")

@@ -46,6 +46,7 @@ def run(args: Namespace, console: Console) -> None:
     length = None if args.composite is None else number(args.composite, "--composite")
     from geounfold.drillholes import read_drillholes
     from geounfold.gain import study_holes
+    from geounfold.gain.from_holes import check_enough_holes
 
     console.stage("reading drill-holes")
     settings = hole_settings(args)
@@ -53,8 +54,11 @@ def run(args: Namespace, console: Console) -> None:
     for line in holes.messages():
         console.warn(line)
     _check_grades(grades, holes)
-    saved = _carrier(args, holes, console)
     samples = holes.samples(length)
+    for grade in grades:  # before the body is unfolded, which takes its time
+        known = samples.loc[samples[grade].notna(), "hole"].nunique()
+        check_enough_holes(grade, int(known), "with values")
+    saved = _carrier(args, holes, console)
     study = study_holes(
         saved, samples, grades, hole="hole", values=values_rules(args), progress=console.stage
     )

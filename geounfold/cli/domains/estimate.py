@@ -51,11 +51,14 @@ def estimate_by(
         def stage(what: str, name: str = name) -> None:
             console.stage(f"{name}: {what}")
 
+        def note(what: str, name: str = name) -> None:
+            console.note(f"{maps.column} {name}: {what}")
+
         try:
             if not sampled.any():
                 raise InputError(f"{samples.source}: no sample of this domain")
             found = estimation(args, saved, samples.only(sampled), table.points[rows], stage)
-            summaries[name] = summarised(args, found, stage)
+            summaries[name] = summarised(args, found, stage, note)
             results[name] = found
         except GeounfoldError as error:
             failures[name] = error
@@ -71,8 +74,8 @@ def estimate_by(
         parted.write_parts(parts["--output"], *makes)
         if "--summary" in parts:
             write_json(parts["--summary"], facts)
-    for name, found in results.items():
-        for warning in found.warnings():
+    for name in results:
+        for warning in summaries[name]["warnings"]:
             console.warn(f"{maps.column} {name}: {warning}")
     count = sum(found.blocks.counts()["estimated"] for found in results.values())
     console.done(f"{args.grade} estimated on {count} of {len(parted)} blocks into {args.output}")

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from geounfold.cli.inputs.numbers import number, three_numbers, whole_number
@@ -69,18 +70,28 @@ def estimation(
     )  # fmt: skip
 
 
-def summarised(args: Namespace, result: Estimation, stage: Callable[[str], None]) -> dict[str, Any]:
-    """Return the summary; with --cross-validate, the cross-validation too."""
+def summarised(
+    args: Namespace,
+    result: Estimation,
+    stage: Callable[[str], None],
+    note: Callable[[str], None],
+) -> dict[str, Any]:
+    """Return the summary; with --cross-validate, the cross-validation too, which is noted."""
     out = result.summary()
     if args.cross_validate:
         from geounfold.estimation import score
+        from geounfold.estimation.scores import cross_validation_told
 
         stage("cross-validating")
         found = result.cross_validation()
-        out["cross_validation"] = {
-            **asdict(score(result.samples.grades, found.estimate)),
-            "flags": found.counts(),
-        }
+        scores = score(result.samples.grades, found.estimate)
+        out["cross_validation"] = {**asdict(scores), "flags": found.counts()}
+        holes = 0 if result.samples.holes is None else len(np.unique(result.samples.holes))
+        told, poor = cross_validation_told(scores, holes)
+        if poor:
+            out["warnings"] = [*out["warnings"], told]
+        else:
+            note(told)
         for method in result.others:
             stage(f"cross-validating {method}")
             other = result.cross_validation(method)

@@ -40,6 +40,8 @@ class EstimationChecks:
         declustering weights if there are any.
     settings : list of dict
         Rows of a setting and its value, as a competent person's report lists them.
+    expected : tuple of str
+        What unfolding is expected to gain here, one sentence each; none if it was not assessed.
     """
 
     grade: str
@@ -48,6 +50,7 @@ class EstimationChecks:
     swaths: Mapping[str, pd.DataFrame]
     tonnage: pd.DataFrame
     settings: list[dict[str, Any]]
+    expected: tuple[str, ...] = ()
 
 
 def estimation_checks(result: Estimation, summary: Mapping[str, Any]) -> EstimationChecks:

@@ -29,7 +29,7 @@ _WORK = 6e7  # samples times the squared size of their subsets: a fit then takes
 _OF_A_HOLE = 12, 4  # most samples of a hole in a subset of neighbours, and in one spread out
 _JITTER = 1e-6  # on the diagonal, as a share of the sill
 _STEPS = 60  # of the optimiser; fits take 10 to 50 (measured)
-_LOGIT = 9.0  # bound of the shares' logits: shares from 1e-4
+_LOGIT = -9.0, 14.0  # bounds of the shares' logits: sills from 1e-4 of the nugget, nugget 1e-6
 _LEFT = float(np.log(20.0))
 
 AXES = {"isotropic": (0, 0, 0), "transverse": (0, 0, 1), "orthotropic": (0, 1, 2)}
@@ -114,7 +114,7 @@ class Subsets:
         """
         which = AXES[anisotropy]
         first = [which.index(k) for k in range(max(which) + 1)]
-        bounds = [(-_LOGIT, _LOGIT)] * len(kinds)
+        bounds = [_LOGIT] * len(kinds)
         bounds += list(zip(np.log(low[first]), np.log(high[first]), strict=True)) * len(kinds)
         bounds += [(-np.inf, np.inf)]
         x = np.clip(start, *np.array(bounds).T)

@@ -170,6 +170,13 @@ def assess(
         carrier, samples, grade=grade, hole=hole, rules=grade_rules(values), soft_boundary=0.0,
         source=str(samples.attrs.get("source", "the samples")),
     )  # fmt: skip
+    return assess_samples(carrier, flat, variogram)
+
+
+def assess_samples(
+    carrier: Any, flat: FlatSamples, variogram: Variogram | None = None
+) -> Assessment:
+    """Return the assessment of samples that are carried to the unfolded space, as `assess`."""
     if flat.holes is None:
         raise InputError(
             "assess needs to know the holes: give the name of the samples' hole column"

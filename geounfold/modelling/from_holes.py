@@ -35,7 +35,7 @@ _TRACE = 0.125  # of the median intercept: distance of points along holes
 _BODY = "body"
 _GOOD = 0.02  # the same length, below which a plane is good: a slab has 0, an open fold 0.03
 _TURN = 360.0  # degrees by which a layer may turn: simulated sheets by 230 at most, a tube by 360
-_POOR = 0.5  # wrongly foretold length over that of ore, above which the user is warned
+_POOR = 0.5  # the same length, above which no fold is chosen and the user is warned
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,30 +266,39 @@ def _reference(
     """Return the surface over which the walls are drawn, its error, and what the user is told.
 
     Of a plane and a fold that one is taken whose walls foretell holes better that are left out. If
-    those over the plane foretell well, no fold is tried.
+    those over the plane foretell well, no fold is tried. A fold that foretells badly is not taken:
+    it has more freedom than the plane, and its turns are then those of single holes.
     """
-    tries: list[Reference] = []
+    plane = None
     if options.shape != "fold" and options.axis is None:
-        tries.append(mean_plane(found))
-    plain = _error(found, tries[0], trace) if tries else None
-    if options.shape != "plane" and (plain is None or plain > _GOOD):
-        try:
-            fold = fold_of(found, trace, options.axis)
-            if fold.turn <= _TURN or not tries:
-                tries.append(fold)
-        except InputError:
-            if not tries:
-                raise
-    errors = [_error(found, reference, trace) for reference in tries]
-    best = int(np.argmin([np.inf if e is None else e for e in errors]))
-    told = [tries[best].told()]
-    return tries[best], errors[best], tuple(told)
+        plane = mean_plane(found)
+    plain = None if plane is None else _error(found, plane, trace)
+    if plane is not None and (options.shape == "plane" or (plain is not None and plain <= _GOOD)):
+        return plane, plain, (plane.told(),)
+    try:
+        fold = fold_of(found, trace, options.axis)
+    except InputError:
+        if plane is None:
+            raise
+        return plane, plain, (plane.told(),)
+    error = _error(found, fold, trace)
+    better = error is not None and (plain is None or error < min(plain, _POOR))
+    if plane is None or (better and fold.turn <= _TURN):
+        return fold, error, (fold.told(),)
+    return plane, plain, (plane.told(),)
 
 
 def _error(found: Intercepts, reference: Reference, trace: Traced) -> float | None:
-    """Return how badly left-out holes are foretold; None if too few are left."""
+    """Return how badly left-out holes are foretold; None if too few are left.
+
+    A fold of all holes has seen the left-out ones, and one drawn without them may differ from it:
+    the larger of both errors counts.
+    """
     try:
-        return foretold(found, reference, trace)
+        seen = foretold(found, reference, trace)
+        if not reference.follows:
+            return seen
+        return max(seen, foretold(found, reference, trace, redrawn=True))
     except InputError:
         return None
 

@@ -38,6 +38,10 @@ class Reference(Protocol):
         """Return a sentence about the surface."""
         ...
 
+    def redrawn(self, found: Intercepts, trace: Traced) -> Reference:
+        """Return the surface drawn from other intercepts, its axes kept."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class FoldReference:
@@ -95,6 +99,10 @@ class FoldReference:
             f"{trend:03.0f}, whose layer turns by {self.turn:.0f} degrees"
         )
 
+    def redrawn(self, found: Intercepts, trace: Traced) -> FoldReference:
+        """Return the fold about the same axis whose curve is drawn from other intercepts."""
+        return fold_about(found, trace, self.axes[2])
+
 
 @dataclass(frozen=True, eq=False)
 class PlaneReference:
@@ -125,6 +133,10 @@ class PlaneReference:
         """Return a sentence with the plane's dip and dip direction."""
         dip, direction = dip_of(self.axes[2])
         return f"the walls are drawn over a plane that dips {dip:.0f} degrees to {direction:03.0f}"
+
+    def redrawn(self, found: Intercepts, trace: Traced) -> PlaneReference:
+        """Return the plane itself: heights above any other would give nearly the same walls."""
+        return self
 
 
 def dip_of(normal: Floats) -> tuple[float, float]:
@@ -193,9 +205,19 @@ def fold_of(
     InputError
         The body falls apart in the profile of the fold.
     """
+    way = found_axis(_near(found, trace)) if axis is None else axis_from_angles(*axis)
+    return fold_about(found, trace, way)
+
+
+def _near(found: Intercepts, trace: Traced) -> Traced:
+    """Return the points in intercepts and within two of their lengths."""
+    return trace.near(found, 2 * float(np.median(found.end - found.start)))
+
+
+def fold_about(found: Intercepts, trace: Traced, way: Floats) -> FoldReference:
+    """Return the fold about an axis, a unit vector (3,), as `fold_of`."""
     usual = float(np.median(found.end - found.start))
-    near = trace.near(found, 2 * usual)
-    way = found_axis(near) if axis is None else axis_from_angles(*axis)
+    near = _near(found, trace)
     rows = np.vstack([across(way), way])
     origin = near.points[near.ore].mean(axis=0)
     flat = (near.points - origin) @ rows.T

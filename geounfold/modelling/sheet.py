@@ -136,34 +136,54 @@ def barren(found: Intercepts, holes: Ints, depths: Floats) -> Bools:
     return out
 
 
-def foretold(found: Intercepts, reference: Reference, trace: Traced) -> float:
+def foretold(
+    found: Intercepts, reference: Reference, trace: Traced, *, redrawn: bool = False
+) -> float:
     """Return the length of wrongly foretold hole over the length of ore, holes left out in turn.
 
-    The reference surface stays that of all holes; the walls are fitted without the group of holes
-    that they foretell.
+    Parameters
+    ----------
+    found : Intercepts
+    reference : Reference
+        Surface of all holes.
+    trace : Traced
+        Body and waste along the holes.
+    redrawn : bool
+        Whether the surface too is drawn without the group of holes that it foretells. If it cannot
+        be drawn, it foretells no body there. The walls are always fitted without the group.
 
     Raises
     ------
     InputError
         The holes are too few.
     """
-    contacts, _ = contacts_of(found, reference)
     hit = np.unique(found.hole)
     group = np.full(int(trace.hole.max()) + 1, -1)
     group[hit] = np.random.default_rng(0).permutation(len(hit)) % _FOLDS
-    local = reference.local(trace.points)
     wrong = ore = 0
     for k in range(_FOLDS):
-        own = group[trace.hole] == k
-        kept = contacts.of(group[found.hole] != k)
-        walls = fit_walls(kept.places, kept.heights, kept.hanging)
-        middle, half = walls.at(local[own, :2])
-        inside = np.abs(local[own, 2] - middle) <= half
+        own, rest = group[trace.hole] == k, group[found.hole] != k
+        inside = _told_inside(found.kept(rest), reference, trace, own, redrawn)
         wrong += int(np.count_nonzero(inside != trace.ore[own]))
         ore += int(np.count_nonzero(trace.ore[own]))
     if not ore:
         raise InputError("no hole is long enough in the body")
     return wrong / ore
+
+
+def _told_inside(
+    rest: Intercepts, reference: Reference, trace: Traced, own: Bools, redrawn: bool
+) -> Bools:
+    """Return which points of the left-out holes lie between walls through the other intercepts."""
+    if redrawn:
+        try:
+            reference = reference.redrawn(rest, trace.kept(~own))
+        except InputError:
+            return np.zeros(int(own.sum()), dtype=bool)
+    contacts, _ = contacts_of(rest, reference)
+    local = reference.local(trace.points[own])
+    middle, half = fit_walls(contacts.places, contacts.heights, contacts.hanging).at(local[:, :2])
+    return np.asarray(np.abs(local[:, 2] - middle) <= half)
 
 
 def one_each_place(found: Intercepts, reference: Reference) -> tuple[Intercepts, tuple[str, ...]]:

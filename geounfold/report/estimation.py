@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from geounfold.report.exploration import drawn
-from geounfold.report.html_text import table, text
+from geounfold.report.html_text import bullets, table, text
 
 if TYPE_CHECKING:
     from geounfold.estimation.checks import EstimationChecks
@@ -27,6 +27,8 @@ def estimation_html(checks: EstimationChecks) -> str:
 
     grade = checks.grade
     parts = ["<h3>Settings and figures of the run</h3>", table(checks.settings)]
+    if checks.expected:
+        parts += ["<h3>What unfolding is expected to gain</h3>", bullets(checks.expected)]
     if checks.variograms:
         words = (
             f"Variograms of {grade} in both spaces along the axes of their models. The unfolded "

@@ -141,6 +141,9 @@ def test_the_report_has_curves_swaths_tonnage_and_settings(files, tmp_path: Path
     for item in ("search radii", "structure 1", "declustered mean of samples", "fewest holes"):
         assert f"<td>{item}" in told
     assert told.count('<figure class="drawn">') >= 3
+    # The verdict is that of assess with the same model.
+    assert "What unfolding is expected to gain" in told
+    assert "nine of ten samples lie within" in told
 
 
 def test_few_samples_are_flagged_and_told(files, tmp_path: Path, capsys) -> None:

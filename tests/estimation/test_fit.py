@@ -24,6 +24,8 @@ from geounfold.estimation.left_out import LeftOut
 from geounfold.estimation.likelihood import Shape, Subsets, packed
 from geounfold.estimation.neighbourhood import Search, least_factor
 from geounfold.estimation.normal_scores import hermite_shares, normal_scores, shape_of_grades
+from geounfold.estimation.systems import solve_systems
+from geounfold.estimation.variogram import LEAST_NUGGET
 from geounfold.synthetic import GradeField
 
 RNG = np.random.default_rng(3)
@@ -108,6 +110,49 @@ def test_the_nugget_is_found_within_its_spread() -> None:
         ).model  # fmt: skip
         shares.append(model.nugget / model.sill)
     assert np.mean(shares) == pytest.approx(0.4, abs=0.1)
+
+
+def test_normal_grades_without_nugget_are_fitted_without_one() -> None:
+    # Normal scores of the same field have a nugget of 0.001 of the sill, and lognormal grades keep
+    # their scores: the change of the distribution is no line.
+    v, how = drilled(1, kind="gaussian"), {"kinds": ["gaussian"], "structures": 1}
+    model = fit_variogram(POINTS, v, holes=HOLES, anisotropy="transverse", **how).model
+    assert LEAST_NUGGET <= model.nugget / model.sill < 1.1 * LEAST_NUGGET
+    assert hermite_shares(v)[0] > 0.95
+    skewed = fit_variogram(POINTS, np.exp(v), holes=HOLES, anisotropy="transverse", **how).model
+    assert skewed.nugget / skewed.sill > 1e-4
+    assert hermite_shares(np.exp(v))[0] < 0.95
+
+
+def test_the_least_nugget_leaves_systems_solvable() -> None:
+    # Two solvers differ by 2e-4 of a deviation with a nugget of 1e-6 of the sill, by 6e-3 with
+    # 1e-7; ranges of several times the samples' extent make the worst systems.
+    model = Variogram(1.01 * LEAST_NUGGET, (Structure("gaussian", 1.0, (1500.0, 1500.0, 300.0)),))
+    v = drilled(1, kind="gaussian", ranges=(150.0, 150.0, 30.0))
+    P = POINTS + np.random.default_rng(2).random(POINTS.shape)
+    order = np.lexsort(P.T[::-1])
+    P, v, holes = P[order], v[order], HOLES[order]
+    near = Neighbourhood(radii=(1e5, 1e5, 2e4), max_samples=24, max_per_hole=6)
+    targets = np.random.default_rng(0).random((100, 3)) * [400, 400, 48]
+    got = krige(P, v, targets, model, near, holes=holes)
+    assert got.counts()["estimated"] == 100
+    found = Search(P, holes, near).find(targets)
+    places = P[found.rows] - targets[:, None]
+    used = np.arange(found.rows.shape[1]) < found.counts[:, None]
+    own = solve_systems(model, places, used, v[found.rows], np.zeros((100, 1, 3)), None)
+    assert np.abs(got.estimate - own.estimate).max() < 1e-3
+    with pytest.raises(OptionError, match="needs a nugget of at least 1e-06 of the sill"):
+        Variogram(1e-7, model.structures)
+
+
+def test_a_second_direction_is_kept_that_left_out_holes_bear_out() -> None:
+    # True ranges 200 and 70; the likelihood of this field grows by less than by chance.
+    v, how = drilled(1, 0.3, ranges=(200.0, 70.0, 15.0)), {"kinds": ["spherical"], "structures": 1}
+    got = fit_variogram(POINTS, v, holes=HOLES, **how)
+    one = fit_variogram(POINTS, v, holes=HOLES, anisotropy="transverse", **how)
+    assert got.anisotropy == "orthotropic"
+    assert 0 < one.value - got.value < np.log(len(POINTS))
+    assert got.model.ranges[0] > 2 * got.model.ranges[1]
 
 
 # ----------------------------------------------------------------------------------- the judge

@@ -153,6 +153,18 @@ def test_assess_prints_its_verdict(files: Path, capsys: pytest.CaptureFixture[st
     assert (files / "a.json").stat().st_size > 0
 
 
+def test_assess_takes_a_model(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = Variogram(0.3, (Structure("spherical", 0.7, (90.0, 90.0, 12.0)),))
+    (files / "v.toml").write_text(model.to_toml(), encoding="utf-8")
+    argv = ["assess", str(files / "m.npz"), str(files / "samples.csv"), "--grade", "grade"]
+    assert main([*argv, "--variogram", str(files / "v.toml")]) == 0
+    out = capsys.readouterr().out
+    assert "over the range of 90 " in out
+    assert "nugget 30%" in out
+    assert main([*argv, "--variogram", str(files / "none.toml")]) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
 def test_the_page_of_a_study_loads_nothing(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tables = [str(files / f"{name}.csv") for name in ("collar", "survey", "assay")]
     page = files / "p.html"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,9 +68,21 @@ def write_estimate_report(
         result.carried.points,
         columns,
         holes=CarriedHoles(samples=CarriedPoints(hole, samples.points, carried.points, known)),
-        estimation=estimation_checks(result, summary),
+        estimation=replace(estimation_checks(result, summary), expected=_expected(result, saved)),
         start=estimate,
     )
+
+
+def _expected(result: Estimation, saved: UnfoldingMap) -> tuple[str, ...]:
+    """Return the verdict of `assess`, one sentence each; none without a variogram or holes."""
+    from geounfold.gain.assessment import assess_samples
+
+    if result.variogram is None or result.samples.holes is None:
+        return ()
+    try:
+        return tuple(assess_samples(saved, result.samples, result.variogram).lines())
+    except InputError as error:
+        return (f"not assessed: {error}",)
 
 
 def _numeric(samples: PointTable, result: Estimation) -> bool:

@@ -52,6 +52,11 @@ def add_assess(commands: Any) -> Parser:
     group.add("--grade", metavar="NAME", required=True, help="column of SAMPLES")
     group.add("--hole", metavar="NAME", help="column of the holes' names, if it is not found")
     group.add("--block-size", metavar="X,Y,Z", help="sides of blocks in a closed surface")
+    group.add(
+        "--variogram",
+        metavar="V.toml",
+        help="a model in the unfolded space, or a summary (.json) with one (default: fitted)",
+    )
     add_samples_choice(group)
     add_grade_values(group)
     group = parser.section("outputs")

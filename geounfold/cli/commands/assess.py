@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from geounfold.cli.answers.file_endings import JSON
 from geounfold.cli.inputs.carrier import carrier_of
-from geounfold.cli.inputs.estimation import sample_table
+from geounfold.cli.inputs.estimation import sample_table, variogram_file
 from geounfold.cli.inputs.points import files_given, read_samples
 from geounfold.cli.inputs.values import values_rules
 from geounfold.cli.terminal.console import Console
@@ -18,7 +18,7 @@ def run(args: Namespace, console: Console) -> None:
     """Print the verdict, and write its figures."""
     outputs = Outputs.planned(
         {"--summary": (args.summary, JSON)},
-        files_given(args.body, args.samples),
+        files_given(args.body, args.samples, args.variogram),
         overwrite=args.overwrite,
         watcher=console.journal,
     )
@@ -26,6 +26,7 @@ def run(args: Namespace, console: Console) -> None:
     if samples is None:
         raise OptionError("assess needs SAMPLES")
     table = sample_table(samples, args)
+    model = None if args.variogram is None else variogram_file(args.variogram)
     if "hole" in table.columns:  # before the body is unfolded, which takes its time
         from geounfold.gain.assessment import check_three_holes
 
@@ -36,7 +37,7 @@ def run(args: Namespace, console: Console) -> None:
     console.stage("assessing")
     from geounfold.gain import assess
 
-    found = assess(saved, table, grade=args.grade, values=values_rules(args))
+    found = assess(saved, table, grade=args.grade, variogram=model, values=values_rules(args))
     for line in found.samples.warnings(args.grade):
         console.warn(line)
     with outputs.writing() as parts:

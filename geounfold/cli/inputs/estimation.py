@@ -56,7 +56,7 @@ def estimation(
     size = None if args.block_size is None else three_numbers(args.block_size, "--block-size")
     parts = _discretise(args)
     also = _also(args)
-    variogram = None if args.variogram is None else _variogram(args.variogram)
+    variogram = None if args.variogram is None else variogram_file(args.variogram)
     off = None if args.position_error is None else _position_error(args.position_error)
     from geounfold.estimation import estimate
 
@@ -211,7 +211,16 @@ def _position_error(text: str) -> tuple[float, float]:
     return along, across
 
 
-def _variogram(path: str) -> Variogram:
+def variogram_file(path: str) -> Variogram:
+    """Return the variogram of a .toml file, or of a .json file: a model, or a summary with one.
+
+    Raises
+    ------
+    InputError
+        The file is missing or not text.
+    OptionError
+        It holds no valid model.
+    """
     from geounfold.estimation import from_json, from_toml
 
     try:

@@ -16,6 +16,7 @@ from geounfold.drillholes.findings import ERROR, NOTE, WARNING, Log, Severity
 from geounfold.drillholes.tables import HoleTable
 from geounfold.errors import InputError
 from geounfold.geometry.mesh import Bools, Floats, Ints
+from geounfold.io.coordinate_columns import coded
 from geounfold.io.selection import nearest_name
 
 LEFT_OUT = "left out"
@@ -126,6 +127,10 @@ def checked_collars(table: HoleTable, assayed: set[str], log: Log) -> Collars:
     whole = np.isfinite(points).all(axis=1)
     for i in np.flatnonzero(~whole):
         _add(log, table, i, "collar without coordinates", _grave(table.hole[i], assayed))
+    for axis, values in zip("xyz", points.T, strict=True):
+        for i in np.flatnonzero(coded(values)):
+            what = f"{axis} of the collar far from all others, perhaps a code for a missing value"
+            _add(log, table, i, what, WARNING, "kept", f"{values[i]:g}")
     frame = pd.DataFrame(points, columns=list("xyz")).assign(hole=table.hole)[whole]
     again = frame["hole"].duplicated()
     places = frame.drop_duplicates().groupby("hole", sort=False)["x"].size()

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from geounfold.errors import InputError, OptionError
-from geounfold.geometry.mesh import Bools, Floats
+from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.column_values import objects
-from geounfold.io.messages import counted, listing, shown
+from geounfold.io.messages import counted, listing, rows_named, shown
 from geounfold.io.packages.names import (
     DEGREES,
     DEPTHS,
@@ -186,6 +186,67 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
             f"'{shown(first)}'{others}{number_hint(first)}"
         )
     return values
+
+
+_NINES = np.array([v for k in range(2, 8) for v in (10**k - 1.0, 10**k - 0.01)])
+"""Codes of missing values that programs write: 99, 99.99, 999 ..., of either sign."""
+
+_ALONE = 0.1
+"""Share of the other values' extent that a code is off the nearest of them, else it is a place."""
+
+
+def coded(values: Floats, codes: Floats | None = None) -> Bools:
+    """Return which coordinates along one axis are codes of missing values, (n,).
+
+    A code is a value of ``codes``, by default nines of either sign, that lies far from all others.
+
+    Examples
+    --------
+    >>> coded(np.array([0.0, 500, -999, 1000])).tolist(), coded(np.array([-999.0, -1000])).tolist()
+    ([False, False, True, False], [False, False])
+    """
+    known = np.abs(values) if codes is None else values
+    found: Bools = np.isin(known, _NINES if codes is None else codes)
+    rest = values[~found & np.isfinite(values)]
+    if not found.any() or not len(rest):
+        return np.zeros(len(values), dtype=bool)
+    for value in np.unique(values[found]):
+        if np.abs(rest - value).min() <= _ALONE * np.ptp(rest):
+            found &= values != value
+    return found
+
+
+def without(values: Floats, missing: tuple[float, ...]) -> Floats:
+    """Return coordinates along one axis with NaN in place of the codes given, see `coded`."""
+    if not missing:
+        return values
+    return np.where(coded(values, np.array(missing)), np.nan, values)
+
+
+def coded_told(points: Floats, columns: Sequence[str], rows: Ints) -> str:
+    """Return the sentence on coordinates that are codes of missing values; empty without any.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Coordinates.
+    columns : sequence of str
+        Their names.
+    rows : (n,) int
+        Data row of each in the file, from 1.
+    """
+    there = [(name, values, coded(values)) for name, values in zip(columns, points.T, strict=True)]
+    told = [(name, values[mask], rows[mask]) for name, values, mask in there if mask.any()]
+    if not told:
+        return ""
+    every = np.unique(np.concatenate([at for _, _, at in told]))
+    code = f"{told[0][1][0]:g}"
+    verb = "has" if len(every) == 1 else "have"
+    return (
+        f"{counted(len(every), 'row')} {verb} {code} as {' and '.join(name for name, _, _ in told)}"
+        f", far from all others, perhaps a code for a missing value: {rows_named(every.tolist())}; "
+        f'--missing {code} --drop-invalid, or --where "{told[0][0]}!={code}", leaves such rows out'
+    )
 
 
 def readable_numbers(column: pd.Series) -> tuple[Floats, Bools]:

@@ -371,6 +371,24 @@ def test_negative_grades_are_told_and_words_are_refused(model, tmp_path: Path, c
     assert "the first 'BDL' at data row 2" in said
 
 
+def test_codes_in_coordinates_are_told(model, tmp_path: Path, capsys) -> None:
+    samples = pd.read_csv(model / "s.csv")
+    samples.loc[7, "z"] = -999
+    samples.to_csv(model / "z.csv", index=False)
+    assert main(estimated(model, tmp_path / "o.csv", samples="z.csv")) == 0
+    said = capsys.readouterr().err
+    assert "z.csv: 1 row has -999 as z, far from all others" in said
+    assert "data row 8; --missing -999 --drop-invalid, or" in said
+    more = ("--missing", "-999", "--overwrite")
+    assert main(estimated(model, tmp_path / "o.csv", *more, samples="z.csv")) == 2
+    assert "1 of 240 rows has a missing or infinite coordinate: data row 8 (" in (
+        capsys.readouterr().err
+    )
+    more = (*more, "--drop-invalid")
+    assert main(estimated(model, tmp_path / "o.csv", *more, samples="z.csv")) == 0
+    assert "1 row without finite coordinates left out: data row 8" in capsys.readouterr().err
+
+
 def test_columns_of_rock_are_no_grades(model, tmp_path: Path, capsys) -> None:
     samples = pd.read_csv(model / "s.csv")
     samples["ZONE"] = np.where(samples["x"] > 100, "OX", "SUL")

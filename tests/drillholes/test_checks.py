@@ -134,6 +134,18 @@ def test_bad_rows_are_named_and_left_out_or_cut(case: str) -> None:
     read_drillholes(*frames(**GOOD), strict=True)
 
 
+def test_a_code_in_a_collar_is_named_and_kept() -> None:
+    given = frames(
+        [*GOOD["collar"], ("C", 20.0, 0.0, -999.0)],
+        [*GOOD["survey"], ("C", 0.0, 0.0, 90.0)],
+        GOOD["assay"],
+    )
+    holes = read_drillholes(*given)
+    check = "z of the collar far from all others, perhaps a code for a missing value"
+    assert found(holes) == {(check, "C", 3)}
+    assert holes.names == ["A", "B", "C"]
+
+
 UNPLACED = {
     "no collar": ("assay", [("C", 0.0, 5.0, 1.0)], "assays of a hole without a usable collar"),
     "two collars": ("collar", [("B", 51.0, 0.0, 100.0)], "duplicate collar with other coordinates"),

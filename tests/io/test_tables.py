@@ -27,7 +27,7 @@ from geounfold.io import (
     write_json,
     write_table,
 )
-from geounfold.io.coordinate_columns import parse_columns
+from geounfold.io.coordinate_columns import coded, coded_told, parse_columns
 from geounfold.io.tables import files as tables_module
 
 EDGES = [0.1 + 0.2, 1 / 3, 625387.5, 1e-300, -0.0, 5e-324, 1.7976931348623157e308, 2.0**53 + 2]
@@ -143,6 +143,28 @@ def test_invalid_rows_can_be_dropped(tmp_path: Path) -> None:
     assert table.dropped.tolist() == [2, 4]
     facts = table.facts()
     assert (facts["rows"], facts["dropped_invalid"], facts["dropped_rows"]) == (4, 2, [2, 4])
+
+
+def test_codes_of_missing_coordinates_are_known_by_their_place(tmp_path: Path) -> None:
+    values = np.array([0.0, 100, 200, 300, 400, -99])
+    # 99 below a body of 400 lies apart by more than a tenth of it; so does no -999 beside -1000.
+    assert np.flatnonzero(coded(values)).tolist() == [5]
+    assert np.flatnonzero(coded(values, np.array([-999.0]))).tolist() == []
+    assert not coded(np.array([-1010.0, -999, -990, -600])).any()
+    assert coded(np.array([5e5, 5e5, 9999999, -99.99])).tolist() == [False, False, True, True]
+    assert not coded(np.array([-999.0, -999.0])).any()  # there is no other place
+    pd.DataFrame({"x": values, "y": 1.0, "z": [1, 2, 3, -99, 5, 6]}).to_csv(tmp_path / "c.csv")
+    with pytest.raises(InputError, match=r"2 of 6 rows have a missing .* data rows 4, 6 "):
+        read_points(tmp_path / "c.csv", missing=(-99,))
+    table = read_points(tmp_path / "c.csv", missing=(-99,), drop_invalid=True)
+    assert table.points[:, 2].tolist() == [1, 2, 3, 5]
+    assert coded_told(read_points(tmp_path / "c.csv").points, table.columns, np.arange(1, 7)) == (
+        "2 rows have -99 as x and z, far from all others, perhaps a code for a missing value: data "
+        'rows 4, 6; --missing -99 --drop-invalid, or --where "x!=-99", leaves such rows out'
+    )
+    # A place that is declared a code, among others, stays one.
+    pd.DataFrame({"x": np.arange(-150.0, 0, 10) + 1, "y": 1, "z": 2}).to_csv(tmp_path / "d.csv")
+    assert len(read_points(tmp_path / "d.csv", missing=(-99,))) == 15
 
 
 def test_duplicates_are_kept_and_counted(tmp_path: Path) -> None:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from geounfold.cli.inputs.model_frame import found_frame
+from geounfold.cli.inputs.values import values_rules
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_points
-from geounfold.io.coordinate_columns import parse_columns
+from geounfold.io.coordinate_columns import coded_told, parse_columns
+from geounfold.io.messages import counted, rows_named
 from geounfold.io.packages.names import Triple
 from geounfold.io.paths import TABLE_ENDINGS, ending
 from geounfold.io.selection import Where, read_where
@@ -48,7 +53,19 @@ def read_all(path: str, args: Namespace, console: Console) -> PointTable:
     return read_table(
         path, args.columns, console,
         drop_invalid=args.drop_invalid, where=where_of(args), element=args.element,
+        missing=missing_of(args),
     )  # fmt: skip
+
+
+def missing_of(args: Namespace) -> tuple[float, ...]:
+    """Return the numbers of --missing, which mean missing coordinates too; () without it."""
+    if getattr(args, "missing", None) is None:
+        return ()
+    found = []
+    for word in values_rules(args).missing:
+        with suppress(ValueError):  # a word, which no coordinate is
+            found.append(float(word))
+    return tuple(found)
 
 
 def read_table(  # 8 parameters and a path: the choices of columns, rows and element
@@ -61,6 +78,7 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
     drop_invalid: bool,
     where: Where | None = None,
     element: str | None = None,
+    missing: tuple[float, ...] = (),
 ) -> PointTable:
     """Read points, and warn of rows that are left out.
 
@@ -83,6 +101,8 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
         Chooses rows; the others stay in the table, marked (`PointTable.chosen`).
     element : str, optional
         Name of the element to read, for a file of several.
+    missing : tuple of float, optional
+        Values that mean a missing coordinate, see `read_points`.
     """
     console.stage(f"reading {path}")
     if place is None and not prefer:
@@ -91,6 +111,7 @@ def read_table(  # 8 parameters and a path: the choices of columns, rows and ele
     table = read_points(
         path, triple(columns),
         prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,
+        missing=missing,
     )  # fmt: skip
     _tell(table, path, console)
     return table
@@ -127,6 +148,7 @@ def open_table(
         return read_table(
             args.points, args.columns, console, prefer, place,
             drop_invalid=args.drop_invalid, where=where_of(args), element=args.element,
+            missing=missing_of(args),
         )  # fmt: skip
     from geounfold.io.tables.large import open_points
 
@@ -140,6 +162,7 @@ def open_table(
         keep=keep,
         where=where_of(args),
         element=args.element,
+        missing=missing_of(args),
     )
     _tell(table, args.points, console)
     return table
@@ -153,6 +176,7 @@ def read_samples(args: Namespace, console: Console) -> PointTable | None:
         args.samples, args.samples_columns, console,
         drop_invalid=args.drop_invalid,
         where=where_of(args, "samples_where"), element=args.samples_element,
+        missing=missing_of(args),
     ).only()  # fmt: skip
 
 
@@ -161,4 +185,12 @@ def _tell(table: PointTable | PointStream, path: str, console: Console) -> None:
     if table.notes:
         console.note(f"{path}: {'; '.join(table.notes)}")
     if len(table.dropped):
-        console.warn(f"{path}: {len(table.dropped)} rows without finite coordinates were left out")
+        count, named = counted(len(table.dropped), "row"), rows_named(table.dropped.tolist())
+        console.warn(f"{path}: {count} without finite coordinates left out: {named}")
+    if isinstance(table, PointTable) or table.kept is not None:
+        every = np.arange(1, len(table) + len(table.dropped) + 1)
+        kept = np.setdiff1d(every, table.dropped, assume_unique=True)
+        chosen = slice(None) if table.chosen is None else table.chosen
+        told = coded_told(table.points[chosen], table.columns, kept[chosen])
+        if told:
+            console.warn(f"{path}: {told}")

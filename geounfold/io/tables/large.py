@@ -311,17 +311,19 @@ def open_points(
     keep: bool = True,
     where: Where | None = None,
     element: str | None = None,
+    missing: tuple[float, ...] = (),
 ) -> PointTable | PointStream:
     """Return the points of a file, in batches if it is a large table.
 
     Parameters
     ----------
-    path, columns, prefer, drop_invalid, place, where, element
+    path, columns, prefer, drop_invalid, place, where, element, missing
         As `read_points` takes them; the errors are the same too.
     keep : bool
         Whether the coordinates of a large file are kept in memory.
     """
-    source = None if element is not None else _large(Path(path), columns)
+    whole = element is not None or bool(missing)  # a code is known by all other values
+    source = None if whole else _large(Path(path), columns)
     if source is not None:
         found = _opened(str(path), source, columns, prefer, drop_invalid, place, keep, where)
         if found is not None:
@@ -329,6 +331,7 @@ def open_points(
     return read_points(
         path, columns,
         prefer=prefer, drop_invalid=drop_invalid, place=place, where=where, element=element,
+        missing=missing,
     )  # fmt: skip
 
 

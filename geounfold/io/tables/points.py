@@ -14,7 +14,7 @@ import pandas as pd
 from geounfold.errors import InputError
 from geounfold.geometry.measures import LARGEST_COORDINATE
 from geounfold.geometry.mesh import Bools, Floats, Ints
-from geounfold.io.coordinate_columns import coordinate_columns, numbers
+from geounfold.io.coordinate_columns import coordinate_columns, numbers, without
 from geounfold.io.messages import counted, listing, rows_named, shown
 from geounfold.io.packages.names import Triple
 from geounfold.io.selection import Where, column_position, not_chosen
@@ -192,6 +192,7 @@ def read_points(
     where: Where | None = None,
     among: Bools | None = None,
     element: str | None = None,
+    missing: tuple[float, ...] = (),
 ) -> PointTable:
     """Return the points of a file: a table, or any format of `geounfold.io.formats`.
 
@@ -213,6 +214,8 @@ def read_points(
         The rows to read, of a file whose row i is the point of row i of another file.
     element : str, optional
         Name of the element to read, for a file of several.
+    missing : tuple of float, optional
+        Values that mean a missing coordinate, where they lie far from all others (see `coded`).
 
     Raises
     ------
@@ -229,7 +232,7 @@ def read_points(
         columns = next((p for p in prefer if set(p) <= set(names)), table.columns)
     found = coordinate_columns(names, columns, source=source, own=place is not None)
     chosen = None if where is None else chosen_rows(where, table.frame, source)
-    axes = [numbers(table.frame.iloc[:, i], source=source) for i in found]
+    axes = [without(numbers(table.frame.iloc[:, i], source=source), missing) for i in found]
     points = np.column_stack(axes)
     if place is not None:
         points = place(points)

@@ -165,7 +165,8 @@ def test_dropped_rows_are_counted_and_said(
     facts = json.loads((tmp_path / "s.json").read_text())["input"]
     assert (facts["rows"], facts["dropped_invalid"], facts["duplicates"]) == (4, 1, 1)
     assert len(pd.read_csv(tmp_path / "out.csv")) == 3
-    assert "p.csv: 1 rows without finite coordinates were left out" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "p.csv: 1 row without finite coordinates left out: data row " in said
 
 
 def test_overwrite_and_quiet(

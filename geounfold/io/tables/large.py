@@ -301,7 +301,7 @@ def _coordinates(
     return points if place is None else place(points)
 
 
-def open_points(
+def open_points(  # 9 parameters: the choices of columns, rows and element, and codes
     path: str | Path,
     columns: Triple | None = None,
     *,

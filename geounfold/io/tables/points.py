@@ -182,7 +182,7 @@ def chosen_facts(chosen: Bools | None, where: str) -> dict[str, Any]:
     return {"where": where, "selected": int(np.count_nonzero(chosen))}
 
 
-def read_points(
+def read_points(  # 9 parameters: the choices of columns, rows and element, and codes
     path: str | Path,
     columns: Triple | None = None,
     *,

@@ -44,6 +44,10 @@ class NoSheetError(InputError):
     """The body has no two opposite surfaces (a ball, a cube), so nothing to flatten."""
 
 
+class StreamError(InputError):
+    """The body cannot be unfolded from batches of its file; in memory it may be."""
+
+
 class TrustError(InputError):
     """The layers of the answer are not to be trusted, and ``strict`` was asked for."""
 

@@ -25,7 +25,7 @@ LEAST_SURFACE = 12_000.0
 LEAST_LAYERS = 1.0
 """Thickness of the body, in cells, below which merging does not take it."""
 
-_SLANT = 1.5
+SLANT = 1.5
 """Mean over all directions of |nx| + |ny| + |nz|: faces of blocks per unit of a smooth surface."""
 
 _FILLED = 0.5  # least share of an inner cell off a lattice, because blocks per cell vary
@@ -76,7 +76,13 @@ def merge_sizes(points: Floats, steps: Floats | None, above: int = MERGE_ABOVE) 
     """
     if len(points) <= above:
         return ()
-    found, merge = [], _largest(points, steps)
+    return sizes_for(*area_and_thickness(points, steps))
+
+
+def sizes_for(area: float, thickness: float) -> tuple[int, ...]:
+    """Return the sizes of `merge_sizes` for a body's area and thickness, working units."""
+    wanted = np.ceil(np.sqrt(area / LEAST_SURFACE))
+    found, merge = [], int(max(1, min(wanted, thickness // LEAST_LAYERS)))
     while merge > 1:
         found.append(merge)
         merge = 3 * merge // 4
@@ -115,15 +121,8 @@ def area_and_thickness(points: Floats, steps: Floats | None) -> tuple[float, flo
     """
     cells, row = OccupiedCells.numbered(_places(points, steps, 2))
     sides = np.ones(3) if steps is None else steps
-    area = 4 * _surface_area(cells, np.bincount(row) / 8, 1 / sides) / _SLANT
+    area = 4 * _surface_area(cells, np.bincount(row) / 8, 1 / sides) / SLANT
     return area, 2 * len(points) / area
-
-
-def _largest(points: Floats, steps: Floats | None) -> int:
-    """Return the largest number of blocks to merge along a side; 1 merges none."""
-    area, thickness = area_and_thickness(points, steps)
-    wanted = np.ceil(np.sqrt(area / LEAST_SURFACE))
-    return int(max(1, min(wanted, thickness // LEAST_LAYERS)))
 
 
 def _places(points: Floats, steps: Floats | None, merge: int) -> Ints:

@@ -15,6 +15,7 @@ from geounfold.body.mending import MendingRecord, mend
 from geounfold.body.mending.mend import WORDS, Mended
 from geounfold.body.mending.record import MendedPlace, places_of
 from geounfold.body.noisy_lattice import disturbed_lattice
+from geounfold.body.occupancy import HollowBody
 from geounfold.body.parts.division import Division, divide
 from geounfold.body.rounded import unrounded
 from geounfold.body.scattered import QUIET, unevenness
@@ -88,6 +89,9 @@ class BodyPoints:
         The faults and limits at which the body was cut off; None if no cut is known.
     shell : TriMesh or None
         The surface of the solid that the blocks fill; None if there is none, or it is no hull.
+    hollow : HollowBody or None
+        All blocks as occupied cells, if only those at the surface are held: ``fitted`` are then
+        those within two of it, and ``blocks`` those at it.
     """
 
     fitted: Floats
@@ -95,6 +99,12 @@ class BodyPoints:
     mended: MendingRecord | None = None
     walls: FaultWalls | None = None
     shell: TriMesh | None = None
+    hollow: HollowBody | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of blocks of the body."""
+        return len(self.blocks) if self.hollow is None else self.hollow.cells.count
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ sin(theta), and so turns by theta sin(theta) instead of theta.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -147,6 +148,18 @@ class Frame:
         over_slices(work, len(out), _SLICE)
         return out
 
+    def middles(self, cells: Ints) -> Floats:
+        """Return the middles of lattice cells (n, 3) in world coordinates.
+
+        Raises
+        ------
+        ValueError
+            There is no lattice.
+        """
+        if self.steps is None:
+            raise ValueError("the frame has no lattice")
+        return self.to_world(cells * self.steps)
+
     def up_in_work(self, world_up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Floats:
         """Return the unit vector (3,) of a world direction in the working frame.
 
@@ -161,6 +174,54 @@ class Frame:
             raise OptionError(f"up must be three finite numbers, not all zero, but is {world_up}")
         out: Floats = self.rotation @ (up / length)
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class CellSums:
+    """Sums over the cells of a lattice that fix its working frame.
+
+    Attributes
+    ----------
+    count : int
+        Number of cells.
+    total : (3,) int
+        Sum of the cells' indices.
+    variance : (3,) float
+        Sum of the squared distances from their mean along each axis, working units.
+    moments : (6, 6, 6) float
+        Means of products of powers (see `_moments`).
+    """
+
+    count: int
+    total: Ints
+    variance: Floats
+    moments: Floats
+
+    @classmethod
+    def of(
+        cls,
+        count: int,
+        total: Ints,
+        variance: Floats,
+        along: list[Floats],
+        product_sums: Callable[[list[Floats]], Floats],
+    ) -> CellSums:
+        """Return the sums of cells whose moments are summed elsewhere.
+
+        Parameters
+        ----------
+        count, total, variance
+            As the attributes.
+        along : list of (n,) float
+            Distances of the layers of cells from the mean along each axis, working units.
+        product_sums : callable
+            Returns the sums over the cells of products of powers, (6, 6, 6), from the powers of
+            the layers along each axis, (6, n) each.
+        """
+        sigma = np.sqrt(variance / count)
+        sigma = np.where(sigma > 0, sigma, 1.0)
+        powers = [_powers(x / s) for x, s in zip(along, sigma, strict=True)]
+        return cls(count, total, variance, _low_orders(product_sums(powers) / count))
 
 
 def working_frame(points: Floats, lattice: Lattice | None, *, exact: bool = True) -> Frame:
@@ -202,14 +263,21 @@ def _lattice_frame(points: Floats, lattice: Lattice) -> Frame:
     cells = lattice_indices(points, lattice)
     scale = float(np.cbrt(lattice.steps.prod()))
     X = (cells - cells.mean(axis=0)) * (lattice.steps / scale)
-    turns = _by_variance(X, proper_permutations())
-    table = _moments(X)
-    turn = _greatest(turns, np.array([_turned(table, turn) for turn in turns]), lattice.axes)
+    sums = CellSums(len(cells), cells.sum(axis=0), np.einsum("ij,ij->j", X, X), _moments(X))
+    return frame_of_sums(sums, lattice)
+
+
+def frame_of_sums(sums: CellSums, lattice: Lattice) -> Frame:
+    """Return the working frame of the cells of a lattice, from sums over them."""
+    scale = float(np.cbrt(lattice.steps.prod()))
+    turns = _by_variance(sums.variance, proper_permutations())
+    tables = np.array([_turned(sums.moments, turn) for turn in turns])
+    turn = _greatest(turns, tables, lattice.axes)
     rotation = turn @ lattice.axes
     steps = (turn * turn) @ lattice.steps
     sides = np.array([float(f"{step:.10g}") for step in steps / scale])
-    rotate = cells @ turn.T.astype(np.int64)
-    middle = (2 * rotate.sum(axis=0) + len(cells)) // (2 * len(cells))
+    total = turn.astype(np.int64) @ sums.total
+    middle = (2 * total + sums.count) // (2 * sums.count)
     return Frame(
         origin=lattice.origin + (middle * steps) @ rotation,
         rotation=rotation,
@@ -238,9 +306,8 @@ def _scattered_frame(points: Floats) -> Frame:
     return Frame(origin=origin, rotation=turn @ axes, scale=scale, steps=None)
 
 
-def _by_variance(X: Floats, turns: Floats) -> Floats:
-    """Return the turns that leave the variances in decreasing order, all of equal order."""
-    variance = np.einsum("ij,ij->j", X, X)
+def _by_variance(variance: Floats, turns: Floats) -> Floats:
+    """Return the turns that leave the variances (3,) in decreasing order, all of equal order."""
     rotate = (turns * turns) @ (variance / variance.sum())
     for axis in range(2):
         kept = rotate[:, axis] >= rotate[:, axis].max() - DECISIVE
@@ -321,8 +388,13 @@ def _moments(X: Floats) -> Floats:
         for i in range(_ORDER + 1):
             left = _ORDER + 1 - i
             table[i, :left, :left] += (x[i] * y[:left]) @ z[:left].T
+    return _low_orders(table / len(X))
+
+
+def _low_orders(table: Floats) -> Floats:
+    """Return a table of moments with zeros for those of an order above five."""
     total = np.add.outer(np.add.outer(*[np.arange(_ORDER + 1)] * 2), np.arange(_ORDER + 1))
-    return np.where(total <= _ORDER, table / len(X), 0.0)
+    return np.where(total <= _ORDER, table, 0.0)
 
 
 def _powers(column: Floats) -> Floats:

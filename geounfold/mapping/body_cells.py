@@ -50,7 +50,14 @@ class BodyCells:
             return None
         filled = np.zeros(shape, dtype=bool)
         filled[tuple((cells - lowest).T)] = True
-        return cls(lowest, shape, np.packbits(filled), steps)
+        return cls.of_table(filled, lowest, steps)
+
+    @classmethod
+    def of_table(cls, filled: Bools, lowest: Ints, steps: Floats) -> BodyCells | None:
+        """Return the occupied cells of a box (a, b, c); None if it has more than 2**28 cells."""
+        if filled.size > _MOST:
+            return None
+        return cls(lowest, np.array(filled.shape), np.packbits(filled), steps)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the cells as arrays of a map file."""

@@ -67,6 +67,8 @@ class PreparedBody:
         The points merged into cells, if there are many; hull and split are then in cells.
     walls : FaultWalls or None
         The faults and limits at which the body was cut off; None if no cut is known.
+    count : int or None
+        Number of blocks, if ``points`` and ``blocks`` are those at the surface alone.
     """
 
     points: Floats
@@ -84,6 +86,7 @@ class PreparedBody:
     stage: Stage
     coarse: MergedBlocks | None = None
     walls: FaultWalls | None = None
+    count: int | None = None
 
     def flatten(self, mesh: TriMesh, start: Floats | None) -> Flattening:
         """Return a surface flattened by the chosen flattener; nothing is repaired."""
@@ -134,6 +137,14 @@ class SurfacePair:
     folded: TriMesh
     unfolded: TriMesh
     flattening: Flattening | None
+
+    def in_world(self, frame: Frame) -> SurfacePair:
+        """Return the pair, given in working units, in the data's coordinates and unit."""
+        return SurfacePair(
+            self.folded.with_vertices(frame.to_world(self.folded.V)),
+            self.unfolded.with_vertices(self.unfolded.V * frame.scale),
+            self.flattening,
+        )
 
     def to_pyvista(self, space: Space = "folded") -> pyvista.PolyData:
         """Return the surface in one space for pyvista.

@@ -144,6 +144,8 @@ class Quality:
     inverted_folded, inverted_unfolded : int
         Tetrahedra whose volume is not positive.  For a map without a control mesh: 0, and the
         number of blocks whose deformation gradient has a determinant that is not positive.
+    sample : int or None
+        Number of blocks that ``nmd`` is taken over, if ``blocks`` holds none.
     """
 
     blocks: BlockQuality
@@ -155,6 +157,7 @@ class Quality:
     volume_unfolded: float
     inverted_folded: int
     inverted_unfolded: int
+    sample: int | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the figures as plain dicts and numbers, without the columns of blocks.
@@ -162,10 +165,11 @@ class Quality:
         ``nmd`` also has the number of blocks it is taken over (``sample``).  These are all blocks
         with an image, so the sampling error of its mean (``standard_error``) is 0.
         """
-        out = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "blocks"}
+        own = [name for name in self.__dataclass_fields__ if name not in ("blocks", "sample")]
+        out = {name: getattr(self, name) for name in own}
         plain = {k: asdict(v) if isinstance(v, Statistics) else v for k, v in out.items()}
         plain["nmd"] |= {
-            "sample": int(np.isfinite(self.blocks.nmd_error).sum()),
+            "sample": self.sample or int(np.isfinite(self.blocks.nmd_error).sum()),
             "standard_error": 0.0,
         }
         return plain
@@ -199,18 +203,47 @@ def assess(
     """
     blocks = block_quality(whole, elements, folded, unfolded, k, gradients, lattice)
     placed = np.asarray(elements) >= 0
+    over_blocks = (
+        Statistics.of(blocks.nmd_error[placed]),
+        Statistics.of(blocks.shear[placed]),
+        Statistics.of(np.abs(blocks.volume_ratio[placed] - 1)),
+    )
+    return of_mesh(control, blocks, over_blocks)
+
+
+def of_mesh(
+    control: ControlMesh,
+    blocks: BlockQuality,
+    over_blocks: tuple[Statistics, Statistics, Statistics],
+    sample: int | None = None,
+) -> Quality:
+    """Return the quality of an unfolding from that of its blocks, and its control mesh.
+
+    Parameters
+    ----------
+    control : ControlMesh
+        The body's tetrahedra.
+    blocks : BlockQuality
+        That of each block.
+    over_blocks : three Statistics
+        ``nmd``, ``shear`` and ``volume_change``.
+    sample : int, optional
+        As the attribute.
+    """
+    nmd, shear, volume_change = over_blocks
     before = tet_volumes(control.folded.V, control.folded.T)
     after = tet_volumes(control.unfolded.V, control.unfolded.T)
     return Quality(
         blocks=blocks,
-        nmd=Statistics.of(blocks.nmd_error[placed]),
-        shear=Statistics.of(blocks.shear[placed]),
-        volume_change=Statistics.of(np.abs(blocks.volume_ratio[placed] - 1)),
+        nmd=nmd,
+        shear=shear,
+        volume_change=volume_change,
         edge_change=Statistics.of(np.abs(edge_change(control.folded, control.unfolded))),
         volume_folded=float(before.sum()),
         volume_unfolded=float(after.sum()),
         inverted_folded=int(np.count_nonzero(before <= 0)),
         inverted_unfolded=int(np.count_nonzero(after <= 0)),
+        sample=sample,
     )
 
 

@@ -12,6 +12,7 @@ cells around them, so memory does not grow with the body.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -180,3 +181,121 @@ def _means(
         total[lacking] = np.nan
         total /= k
     return sums
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeWindow:
+    """Some blocks of a lattice, sorted by cell, for the neighbours of a part of them.
+
+    Attributes
+    ----------
+    keys : (n,) int
+        A number per block, sorted: (x * shape[1] + y) * shape[2] + z of its cell.
+    shape : (3,) int
+        Sides of the box of the numbers, with an empty margin as wide as the longest offset.
+    """
+
+    keys: Ints
+    shape: Ints
+
+    def mean_distances(
+        self, sides: Floats, cloud: Floats, k: int, rows: slice
+    ) -> tuple[Floats, Floats]:
+        """Return the mean distance to the k nearest neighbours on the lattice and in a cloud.
+
+        Parameters
+        ----------
+        sides : (3,) float
+            Sides of a cell.
+        cloud : (n, 3) float
+            The blocks elsewhere, in the same unit.
+        k : int
+            Number of neighbours.
+        rows : slice
+            The blocks whose neighbours are wanted, (m,).
+
+        Returns
+        -------
+        before, after : (m,) float
+            NaN for a block with fewer than k neighbours at the offsets tried.
+        """
+        shells = offsets_by_length(sides)
+        stride = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
+        steps = [shell @ stride for shell in shells]
+        lengths = [float(np.linalg.norm(shell[0] * sides)) for shell in shells]
+        margin = int(max(step.max() for step in steps))
+        columns = [np.ascontiguousarray(column) for column in cloud.T]
+        count = rows.stop - rows.start
+        before, after = np.empty(count), np.empty(count)
+
+        def work(part: slice) -> None:
+            own = self.keys[rows.start + part.start : rows.start + part.stop]
+            first, last = int(own[0]) - margin, int(own[-1]) + margin
+            a, b = np.searchsorted(self.keys, [first, last + 1])
+            table = np.full(last - first + 1, -1, dtype=np.int32)
+            table[self.keys[a:b] - first] = np.arange(b - a, dtype=np.int32)
+            near = [column[a:b] for column in columns]
+            before[part], after[part] = _both_means(table, own - first, (steps, lengths), near, k)
+
+        over_slices(work, count, _SLICE)
+        return before, after
+
+
+def margin_of(sides: Floats) -> Ints:
+    """Return how many cells the longest offset reaches along each axis, (3,)."""
+    out: Ints = np.abs(np.concatenate(offsets_by_length(sides))).max(axis=0)
+    return out
+
+
+def _both_means(
+    table: Numbers,
+    at: Ints,
+    shells: tuple[list[Ints], list[float]],
+    near: list[Floats],
+    k: int,
+) -> tuple[Floats, Floats]:
+    """Return what `_means` does for the lattice itself and one cloud.
+
+    Parameters
+    ----------
+    table, at, k
+        As `_means` takes them.
+    shells : (list of (s,) int, list of float)
+        Shells of offsets, as differences of table positions, and their lengths.
+    near : list of (r,) float
+        The three coordinates of the table's rows in the cloud.
+    """
+    own = table[at]
+    here = [c[own] for c in near]
+    after, before = np.zeros(len(at)), 0.0
+    whole: Bools = np.ones(len(at), dtype=bool)
+    taken = 0
+    for shell, far in zip(*shells, strict=True):
+        weight = min(1.0, (k - taken) / len(shell))
+        for step in shell:
+            other = table.take(at + step)
+            whole &= other >= 0
+            after += weight * lengths_between(here, [c.take(other, mode="wrap") for c in near])
+        before += weight * len(shell) * far
+        taken += len(shell)
+        if taken >= k:
+            break
+    mean = np.full(len(at), before)
+    lacking = np.flatnonzero(~whole)
+    after[lacking] = mean[lacking] = 0.0
+    count = np.zeros(len(lacking), dtype=np.int64)
+    for shell, far in zip(*shells, strict=True):
+        if not len(lacking):
+            break
+        other = table[at[lacking, None] + shell]
+        row, column = np.nonzero(other >= 0)
+        block, other = lacking[row], other[row, column]
+        there = np.bincount(row, minlength=len(lacking))
+        share = np.minimum(k - count, there) / np.maximum(there, 1)
+        length = lengths_between([c[block] for c in here], [c[other] for c in near])
+        after[lacking] += share * np.bincount(row, length, len(lacking))
+        mean[lacking] += share * there * far
+        count += there
+        lacking, count = lacking[count < k], count[count < k]
+    after[lacking] = mean[lacking] = np.nan
+    return mean / k, after / k

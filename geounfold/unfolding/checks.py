@@ -76,13 +76,23 @@ def check_single(groups: Sequence[Ints], options: UnfoldOptions) -> None:
         )
 
 
-def check_torn(torn: Ints, folded: Floats, options: UnfoldOptions) -> None:
-    """Raise ControlMeshError if neighbours were torn apart, unless that is allowed."""
+def check_torn(torn: Floats, count: int, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError if neighbours were torn apart, unless that is allowed.
+
+    Parameters
+    ----------
+    torn : (k, 3) float
+        The blocks that were torn from one they touch, in the data's coordinates.
+    count : int
+        Number of all blocks.
+    options : UnfoldOptions
+        Of the run.
+    """
     if not len(torn) or options.allow_uncertified:
         return
-    where = ", ".join(f"{c:.6g}" for c in np.median(folded[torn], axis=0))
+    where = ", ".join(f"{c:.6g}" for c in np.median(torn, axis=0))
     raise ControlMeshError(
-        f"{len(torn)} of {len(folded)} blocks were torn from their neighbours, around ({where}): "
+        f"{len(torn)} of {count} blocks were torn from their neighbours, around ({where}): "
         "limbs too close together, or a sheet too narrow for its thickness; try another --hull, "
         "or --allow-uncertified to write the answer all the same"
     )
@@ -138,11 +148,16 @@ def check_placed(prepared: PreparedPoints, carried: Carried, options: UnfoldOpti
     """
     folded, kept = prepared.points, prepared.mended.fate == 0
     rows = np.concatenate([g[~carried.placed[g] & kept[g]] for g in prepared.groups])
-    if len(rows) <= few(len(folded)) or options.allow_uncertified:
+    check_reached(folded[rows], len(folded), options)
+
+
+def check_reached(missed: Floats, count: int, options: UnfoldOptions) -> None:
+    """Raise ControlMeshError if more than a few blocks (k, 3) of ``count`` have no image."""
+    if len(missed) <= few(count) or options.allow_uncertified:
         return
-    where = ", ".join(f"{c:.6g}" for c in np.median(folded[rows], axis=0))
+    where = ", ".join(f"{c:.6g}" for c in np.median(missed, axis=0))
     raise ControlMeshError(
-        f"{len(rows)} of {len(folded)} blocks lie outside the control mesh and farther than its "
+        f"{len(missed)} of {count} blocks lie outside the control mesh and farther than its "
         f"reach, around ({where}): try another --hull, a larger --reach, or --allow-uncertified "
         "to leave them empty"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from geounfold.body.fault_surface import FaultWalls
-from geounfold.body.merged_blocks import merge_blocks, merge_sizes
+from geounfold.body.merged_blocks import MergedBlocks, merge_blocks, merge_sizes
 from geounfold.body.prepare import BodyPoints
 from geounfold.body.scattered import scattered
 from geounfold.body.working_frame import Frame
@@ -13,9 +13,11 @@ from geounfold.errors import (
     BackendError,
     ControlMeshError,
     FlatteningError,
+    GeounfoldError,
     HullError,
     NoSheetError,
     SplitError,
+    StreamError,
 )
 from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Bools, Floats, TriMesh
@@ -82,12 +84,15 @@ def _fit_in_turn(
     if body.mended is not None and reference is None:
         body.mended.check()
     with stage("hull"):
-        tried = _merges(body.fitted, frame, options, reference)
+        tried = _merges(body, frame, options, reference)
+    failed: GeounfoldError | None = None
     for merge in tried:
         try:
             return _fit_at(merge, body, frame, options, reference, stage)
-        except _TOO_COARSE:
-            continue
+        except _TOO_COARSE as error:
+            failed = error
+    if body.hollow is not None:
+        raise StreamError(f"no fit to merged blocks holds ({failed or 'it has too few blocks'})")
     try:
         return _fit_at(1, body, frame, options, reference, stage)
     except _TOO_COARSE as error:
@@ -101,13 +106,15 @@ _TOO_COARSE = (BackendError, ControlMeshError, FlatteningError, HullError, NoShe
 
 
 def _merges(
-    points: Floats, frame: Frame, options: UnfoldOptions, reference: object
+    body: BodyPoints, frame: Frame, options: UnfoldOptions, reference: object
 ) -> tuple[int, ...]:
     """Return how many blocks to merge along a cell's side, the most first (see merge_sizes).
 
     Scattered points are not merged: the share of such a cell that is full is not known.
     """
-    above = options.sheet_options.merge_above
+    above, points = options.sheet_options.merge_above, body.fitted
+    if body.hollow is not None:
+        return body.hollow.merge_sizes(above)
     if reference is not None or options.method != "sheet" or len(points) <= above:
         return ()
     if frame.steps is None and scattered(points):
@@ -128,7 +135,7 @@ def _fit_at(
     if reference is None:
         with stage("hull"):
             name = method.hull if options.hull == "auto" else options.hull
-            coarse = merge_blocks(points, frame.steps, merge) if merge > 1 else None
+            coarse = _merged(body, frame, merge) if merge > 1 else None
             cells, share = (points, None) if coarse is None else (coarse.points, coarse.share)
             if body.shell is None:
                 hull = extract_hull(cells, frame.sides, name, options.hull_options, share)
@@ -158,6 +165,7 @@ def _fit_at(
         sheet_options=options.sheet_options,
         stage=stage,
         coarse=coarse,
+        count=None if body.hollow is None else body.count,
         walls=body.walls if reference is None else None,
     )
     result = method.fit(prepared)
@@ -167,6 +175,13 @@ def _fit_at(
                 result, spread=run_members(prepared, result.sheet, options.uncertainty)
             )
     return turned_over(result) if over else result
+
+
+def _merged(body: BodyPoints, frame: Frame, merge: int) -> MergedBlocks:
+    """Return the blocks of a body merged into cells of ``merge`` blocks a side."""
+    if body.hollow is not None:
+        return body.hollow.merged(merge)
+    return merge_blocks(body.fitted, frame.steps, merge)
 
 
 def _walled(hull: TriMesh, walls: FaultWalls) -> Bools:

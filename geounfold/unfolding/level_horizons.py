@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from geounfold.body.working_frame import Frame
+from geounfold.geometry.mesh import Floats
 from geounfold.mapping.carried import Carried
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.methods import BodyFit, PointwiseMap
@@ -39,14 +40,32 @@ def flat_size(fits: Sequence[BodyFit], carried: Carried, frame: Frame) -> dict[s
     Length and width are the extents of the blocks' centroids along their principal axes in plan,
     and a block's side; the thickness is the median over the hull's top and bottom.
     """
-    scale = frame.scale
     plan = carried.points[carried.placed][:, :2]
+    centred = plan - plan.mean(axis=0) if len(plan) else plan
+    return flat_extents(fits, plan, centred.T @ centred, frame)
+
+
+def flat_extents(
+    fits: Sequence[BodyFit], plan: Floats, square: Floats, frame: Frame
+) -> dict[str, float | None]:
+    """Return the sizes of `flat_size` from flat places.
+
+    Parameters
+    ----------
+    fits, frame
+        As `flat_size` takes them.
+    plan : (n, 2) float
+        Places in plan of the blocks, or of those at the surface.
+    square : (2, 2) float
+        Sum of the squared distances of all blocks from their mean.
+    """
+    scale = frame.scale
     thick = [fit.signs.thickness for fit in fits if fit.signs is not None]
     known = [float(t) for t in thick if np.isfinite(t)]
     if len(plan) < 2:
         return {"length": None, "width": None, "thickness": None}
     centred = plan - plan.mean(axis=0)
-    axes = np.linalg.eigh(centred.T @ centred)[1]
+    axes = np.linalg.eigh(square)[1]
     width, length = (np.ptp(centred @ axes, axis=0) + scale).tolist()
     thickness = float(np.median(known)) * scale if known else None
     return {"length": max(length, width), "width": min(length, width), "thickness": thickness}

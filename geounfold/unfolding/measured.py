@@ -99,7 +99,7 @@ def measure(
             returned = _returned(mapping, P, carried)
             quality = _quality(mapping, carried, P, frame, prepared.work, options.neighbours)
     check_coordinates(quality, returned, P, options)
-    check_torn(torn, P, options)
+    check_torn(P[torn], len(P), options)
     with stage("trust"):
         trust = _trust(mapping, prepared, fits, carried)
         if faulted is not None:
@@ -189,9 +189,9 @@ def _certificate(
         return Certificate.unproved(mapping.fault)
     control, shell, held = mapping.control, mapping.shell, carried.element
     if mapping.parts is None:
-        return _in_data(certify(control, shell, held), frame)
+        return in_data(certify(control, shell, held), frame)
     apart = not isinstance(mapping.parts.cells, FaultCells)
-    return _in_data(certify_parts(control, shell, held, mapping.parts.vertex, apart=apart), frame)
+    return in_data(certify_parts(control, shell, held, mapping.parts.vertex, apart=apart), frame)
 
 
 def _quality(
@@ -217,7 +217,7 @@ def _quality(
     return assess(world, whole, carried.element, P, carried.points, k, gradients, lattice)
 
 
-def _in_data(certificate: Certificate, frame: Frame) -> Certificate:
+def in_data(certificate: Certificate, frame: Frame) -> Certificate:
     """Return a certificate with places in the data's coordinates and unit."""
     folded = frame.to_world(certificate.folded)
     return replace(certificate, folded=folded, unfolded=certificate.unfolded * frame.scale)

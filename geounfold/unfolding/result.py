@@ -21,7 +21,7 @@ from geounfold.methods import PointwiseMap, SurfacePair, no_mesh
 from geounfold.surfaces.hull import Hull
 from geounfold.unfolding.measured import in_world
 from geounfold.unfolding.notebook_card import Facts
-from geounfold.unfolding.summary import RunRecord, body_volume, full_box, summarise, warnings_of
+from geounfold.unfolding.summary import RunRecord, body_volume, summarise, warnings_of
 
 if TYPE_CHECKING:
     import dask.dataframe
@@ -341,14 +341,7 @@ class Unfolding:
     @cached_property
     def surfaces(self) -> dict[str, SurfacePair]:
         """Top, bottom and mid surface of the (largest) body, folded and unfolded."""
-        return {
-            name: SurfacePair(
-                pair.folded.with_vertices(self.frame.to_world(pair.folded.V)),
-                pair.unfolded.with_vertices(pair.unfolded.V * self.frame.scale),
-                pair.flattening,
-            )
-            for name, pair in self.fits[0].surfaces.items()
-        }
+        return {name: pair.in_world(self.frame) for name, pair in self.fits[0].surfaces.items()}
 
     @property
     def top(self) -> SurfacePair:
@@ -434,7 +427,7 @@ class Unfolding:
         """Return what the DataFrame's columns tell of other rock among the rows."""
         if self._given is None or self.chosen is not None or self._given.shape[1] <= 3:
             return []
-        return [n for n in (mixed_frame(self._given), box_told(full_box(self._record))) if n]
+        return [n for n in (mixed_frame(self._given), box_told(self._record.full_box)) if n]
 
     @property
     def injective(self) -> bool:

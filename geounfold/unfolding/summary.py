@@ -18,7 +18,7 @@ from geounfold.faults.limit_rims import LimitRim
 from geounfold.faults.result import FaultResult
 from geounfold.flattening import Flattening
 from geounfold.geometry.measures import enclosed_volume, triangle_areas
-from geounfold.geometry.mesh import Floats, Ints
+from geounfold.geometry.mesh import Floats
 from geounfold.io.messages import counted
 from geounfold.mapping.mesh_map import UnfoldingMap
 from geounfold.mapping.prism_coordinates import PrismInterpolant
@@ -65,6 +65,59 @@ class RunRecord:
     faulted: FaultResult | None = None
     uncertainty: PositionUncertainty | None = None
     limits: tuple[LimitRim, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.prepared.points)
+
+    @property
+    def duplicates(self) -> int:
+        """Number of points with the coordinates of an earlier one."""
+        return count_duplicates(self.prepared.points)
+
+    @property
+    def apart(self) -> Floats:
+        """The points that are in none of the bodies to unfold, (k, 3)."""
+        rest = np.ones(len(self.prepared.points), dtype=bool)
+        for group in self.prepared.groups:
+            rest[group] = False
+        return self.prepared.points[rest]
+
+    @property
+    def left_empty(self) -> Floats:
+        """The points without an image, (k, 3)."""
+        return self.prepared.points[~self.measured.carried.placed]
+
+    @property
+    def torn(self) -> int:
+        """Number of blocks that came to lie far from a block that they touch."""
+        return len(self.measured.torn)
+
+    @property
+    def largest_distance(self) -> float:
+        """Largest distance of a point from the control mesh."""
+        return float(self.measured.carried.distance.max())
+
+    @property
+    def flat_size(self) -> dict[str, float | None]:
+        """Length, width and thickness of the unfolded body (see `level_horizons.flat_size`)."""
+        return flat_size(self.fits, self.measured.carried, self.prepared.frame)
+
+    @property
+    def volumes(self) -> dict[str, float | None]:
+        """Volume of the blocks in both spaces (see `body_volume`)."""
+        return body_volume(self)
+
+    @property
+    def full_box(self) -> list[int] | None:
+        """Sides of the lattice's box in blocks if the blocks fill it; None else."""
+        cells = self.prepared.cells
+        if cells is None or not len(cells):
+            return None
+        sides = np.ptp(cells, axis=0) + 1
+        full = len(cells) >= np.prod(sides.astype(np.float64))
+        return [int(side) for side in sides] if full else None
 
     @property
     def outside(self) -> int:
@@ -117,7 +170,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "version": __version__,
         "options": run.options.as_dict(),
         "config": to_toml(run.options),
-        "points": len(run.prepared.points),
+        "points": run.count,
         "bodies": run.prepared.bodies if run.faulted is None else len(set(run.faulted.groups)),
         "parts": _parts(run),
         "junctions": [_junction(j) for j in run.junctions],
@@ -127,7 +180,7 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "mended": run.prepared.mended.summary(),
         "seconds": run.seconds,
         "peak_memory_mb": peak_memory_mb(),
-        "body_volume": body_volume(run),
+        "body_volume": run.volumes,
         "hull": _hull(run),
         **{name: _surface(pair) for name, pair in surfaces.items()},
         "flattening": {name: _flattening(found) for name, found in fit.flattenings.items()},
@@ -137,13 +190,13 @@ def summarise(run: RunRecord, surfaces: Mapping[str, SurfacePair]) -> dict[str, 
         "inverted_unfolded": certificate.inverted_unfolded,
         "injective": run.injective,
         "horizons": level_errors(run.fits, run.map, run.prepared.frame),
-        "flat_size": flat_size(run.fits, run.measured.carried, run.prepared.frame),
+        "flat_size": run.flat_size,
         "coordinates": _coordinates(run),
         "certificate": certificate.as_dict(),
-        "outside_share": run.outside / len(run.prepared.points),
+        "outside_share": run.outside / run.count,
         "outside": _outside(run),
         "round_trip_max": run.round_trip_max,
-        "torn": len(run.measured.torn),
+        "torn": run.torn,
         "trust": None if run.measured.trust is None else run.measured.trust.as_dict(),
         **({} if run.uncertainty is None else {"uncertainty": run.uncertainty.summary()}),
         **run.measured.quality.summary(),
@@ -159,21 +212,20 @@ def warnings_of(run: RunRecord) -> list[str]:
             f"the coordinates were rounded: blocks were moved by up to {run.prepared.moved:.2g} "
             "onto their lattice; export them with more digits if they are known"
         )
-    duplicates = count_duplicates(run.prepared.points)
-    if duplicates:
+    if duplicates := run.duplicates:
         out.append(f"{duplicates} points repeat the coordinates of another; all were kept")
-    apart = _apart(run)
+    apart = run.apart
     if len(apart):
         out.append(
             f"{counted(len(apart), 'point is', 'points are')} not part of the unfolded body, "
-            f"{_first_place(run, apart)}; the map carries what it reaches"
+            f"{_first_place(apart)}; the map carries what it reaches"
         )
     if run.prepared.mended.changed:
         out.append(run.prepared.mended.sentence())
     out += [_told(junction) for junction in run.junctions]
     out += [] if run.faulted is None else run.faulted.warnings()
     out += [limit.warning() for limit in run.limits if limit.missed]
-    count, outside, empty = len(run.prepared.points), run.outside, run.empty
+    count, outside, empty = run.count, run.outside, run.empty
     if outside > empty:
         out.append(
             f"{outside - empty} of {count} points lie outside the control mesh and "
@@ -183,11 +235,11 @@ def warnings_of(run: RunRecord) -> list[str]:
         out.append(
             f"{empty} of {count} points lie farther from the control mesh than the "
             f"map reaches ({run.map.reach * run.prepared.frame.scale:.6g}) or were torn from "
-            f"their neighbours, {_first_place(run, np.flatnonzero(~run.measured.carried.placed))}; "
+            f"their neighbours, {_first_place(run.left_empty)}; "
             "they were left empty and are marked outside"
         )
-    if len(run.measured.torn):
-        out.append(f"{len(run.measured.torn)} blocks were torn from their neighbours")
+    if run.torn:
+        out.append(f"{run.torn} blocks were torn from their neighbours")
     trust = run.measured.trust
     if trust is not None and trust.word == "poor":
         out.append(trust.sentence())
@@ -197,16 +249,6 @@ def warnings_of(run: RunRecord) -> list[str]:
     if run.lost:
         out.append(f"{run.lost} points were not brought back by the map")
     return out
-
-
-def full_box(run: RunRecord) -> list[int] | None:
-    """Return the sides of the lattice's box in blocks if the blocks fill it; None else."""
-    cells = run.prepared.cells
-    if cells is None or not len(cells):
-        return None
-    sides = np.ptp(cells, axis=0) + 1
-    full = len(cells) >= np.prod(sides.astype(np.float64))
-    return [int(side) for side in sides] if full else None
 
 
 def body_volume(run: RunRecord) -> dict[str, float | None]:
@@ -226,18 +268,10 @@ def body_volume(run: RunRecord) -> dict[str, float | None]:
     return {"folded": folded, "unfolded": folded * float(known.mean()) if alike else None}
 
 
-def _apart(run: RunRecord) -> Ints:
-    """Return the rows of the points that are in none of the bodies to unfold."""
-    rest = np.ones(len(run.prepared.points), dtype=bool)
-    for group in run.prepared.groups:
-        rest[group] = False
-    return np.flatnonzero(rest)
-
-
-def _first_place(run: RunRecord, rows: Ints) -> str:
+def _first_place(points: Floats) -> str:
     """Return words that name the coordinates of the first of some points."""
-    place = ", ".join(f"{c:.10g}" for c in run.prepared.points[rows[0]])
-    return f"{'at' if len(rows) == 1 else 'the first at'} ({place})"
+    place = ", ".join(f"{c:.10g}" for c in points[0])
+    return f"{'at' if len(points) == 1 else 'the first at'} ({place})"
 
 
 def _told(junction: Junction) -> str:
@@ -311,7 +345,7 @@ def _lattice(run: RunRecord) -> dict[str, Any]:
     if run.prepared.lattice is None:
         return {"found": False, "spacing": spacing}
     steps = run.prepared.lattice.steps.tolist()
-    return {"found": True, "spacing": spacing, "steps": steps, "full_box": full_box(run)}
+    return {"found": True, "spacing": spacing, "steps": steps, "full_box": run.full_box}
 
 
 def _hull(run: RunRecord) -> dict[str, Any]:
@@ -370,11 +404,10 @@ def _in_prisms(run: RunRecord, prisms: PrismInterpolant) -> int:
 
 
 def _outside(run: RunRecord) -> dict[str, Any]:
-    carried = run.measured.carried
     return {
-        "extrapolated": int((carried.placed & ~carried.inside).sum()),
-        "empty": int((~carried.placed).sum()),
-        "largest_distance": float(carried.distance.max()),
+        "extrapolated": run.outside - run.empty,
+        "empty": run.empty,
+        "largest_distance": run.largest_distance,
         "reach": run.map.reach * run.prepared.frame.scale,
     }
 

@@ -79,6 +79,24 @@ class Mended:
         return int((self.fate == WORDS.index(word)).sum())
 
 
+@dataclass(frozen=True, eq=False)
+class MendedBox:
+    """A mended body in its box.
+
+    Attributes
+    ----------
+    body, cut : (i, j, k) bool
+        The mended body, and the cells cut as bridges.
+    handles_closed, handles_left : int
+        As in `Mended`.
+    """
+
+    body: Bools
+    cut: Bools
+    handles_closed: int
+    handles_left: int
+
+
 def mend(cells: Ints) -> Mended:
     """Return what is to be mended of a body.
 
@@ -96,17 +114,38 @@ def mend(cells: Ints) -> Mended:
     box = VoxelBody.of(cells)
     if box is None or OccupiedCells.of(cells).usual_neighbours < FEWEST:
         return Mended(np.zeros((0, 3), np.int64), np.zeros(len(cells), np.int64), 0, 0)
-    solid = fill_cavities(box.full)
+    found = mend_box(box.full)
+    return Mended(
+        filled=box.cells(found.body & ~box.full),
+        fate=_fates(cells, box, found.body, found.cut),
+        handles_closed=found.handles_closed,
+        handles_left=found.handles_left,
+    )
+
+
+def mend_lost(box: VoxelBody) -> tuple[Mended, Bools]:
+    """Return what is to be mended of a body in a box, and the mended body (i, j, k).
+
+    ``Mended.fate`` is that of the cells that the mended body lacks alone.
+    """
+    found = mend_box(box.full)
+    lost = box.cells(box.full & ~found.body)
+    return Mended(
+        filled=box.cells(found.body & ~box.full),
+        fate=_fates(lost, box, found.body, found.cut) if len(lost) else np.zeros(0, np.int64),
+        handles_closed=found.handles_closed,
+        handles_left=found.handles_left,
+    ), found.body
+
+
+def mend_box(full: Bools) -> MendedBox:
+    """Return the cells of a box (i, j, k) mended."""
+    solid = fill_cavities(full)
     before = handle_count(solid)
     whole = fill_lenses(solid)
     handles = before if whole is solid else handle_count(whole)
     body, cut, left = _without_handles(whole, handles)
-    return Mended(
-        filled=box.cells(body & ~box.full),
-        fate=_fates(cells, box, body, cut),
-        handles_closed=before - left,
-        handles_left=left,
-    )
+    return MendedBox(body, cut, before - left, left)
 
 
 def _without_handles(whole: Bools, handles: int) -> tuple[Bools, Bools, int]:

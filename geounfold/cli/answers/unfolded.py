@@ -88,8 +88,7 @@ class UnfoldedBody:
         body = self._body
         body.table.write_parts(parts["--output"], self._table_columns)
         # The table may be written in batches, which give the sums of the volumes.
-        self.summary.update(body.volumes.facts())
-        self.warnings += body.volumes.warnings()
+        self._complete()
         if body.samples is not None and self._samples is not None and "--samples-out" in parts:
             body.samples.write(parts["--samples-out"], self._samples)
         if body.holes is not None:
@@ -110,11 +109,20 @@ class UnfoldedBody:
         if "--report" in parts:
             self._write_report(parts["--report"])
 
+    def _complete(self) -> None:
+        """Add what is known once the table was written."""
+        self.summary.update(self._body.volumes.facts())
+        self.warnings += self._body.volumes.warnings()
+
     def _table_columns(self, frame: pd.DataFrame, points: Floats, rows: slice) -> dict[str, Any]:
         """Return the output columns of a batch of rows."""
         world = {} if self._body.frame is None else world_columns(points)
-        found = block_results(self._result, rows, self._asked)
+        found = self._results(points, rows)
         return {**world, **found, **self._body.volumes.columns(frame, found)}
+
+    def _results(self, points: Floats, rows: slice) -> dict[str, Any]:
+        """Return the results of a batch of rows."""
+        return block_results(self._result, rows, self._asked)
 
     def _write_report(self, path: Path) -> None:
         from geounfold.report import carried_faults, write_report

@@ -43,6 +43,8 @@ _DISTORTION = """\
                    if the blocks' sides are known: from --sizes, or from
                    columns called XINC, dx, size_x or alike"""
 
+ENGINES = ("auto", "memory", "batches")
+
 _EXAMPLES = (
     "geounfold unfold blocks.csv -o flat.csv --summary s.json --report r.html",
     "geounfold unfold blocks.csv -o flat.csv --map m.npz \\\n"
@@ -87,6 +89,13 @@ def add_unfold(commands: Any) -> Parser:
     group.add("--bottom", metavar="B", help="the bottom surface")
     add_frame(group, "POINTS")
     _add_outputs(parser)
+    group = parser.section("large tables")
+    group.add(
+        "--engine",
+        choices=ENGINES,
+        default=ENGINES[0],
+        help="memory: all rows at once; batches: a Parquet file or folder larger than memory",
+    )
     group = parser.section("samples and drill-holes")
     group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")
     group.add("--samples-out", metavar="Q", help="the carried samples, loose or of drill-holes")

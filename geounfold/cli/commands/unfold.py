@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from geounfold.cli.answers.closing import closing_lines, names_of
 from geounfold.cli.answers.file_endings import HTML, JSON, MAP, POINTS_OUT, TRACES, VTU
 from geounfold.cli.answers.unfolded import UnfoldedBody
+from geounfold.cli.commands.unfold_in_batches import unfold_in_batches
 from geounfold.cli.domains.unfold import check_by, unfold_by
 from geounfold.cli.inputs.body import read_body
 from geounfold.cli.inputs.drillholes import check_hole_options
+from geounfold.cli.inputs.engine import in_batches
 from geounfold.cli.inputs.faults import check_fault_options
 from geounfold.cli.inputs.grades import check_grade_options, exploration
 from geounfold.cli.inputs.points import files_given
@@ -38,6 +40,9 @@ def run(args: Namespace, console: Console) -> None:
         _check_rendering(console)
     options = unfold_options(args)
     _check_mesh_outputs(args, options)
+    rows = in_batches(args, options)
+    if rows is not None and unfold_in_batches(args, console, outputs, options, rows):
+        return
     body = read_body(args, console)
     if args.by is not None:
         unfold_by(args, console, outputs, options, body)

@@ -96,6 +96,18 @@ class ParquetSource:
             frame = batch.to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
             yield frame if chosen is None else frame[chosen]
 
+    def run(self, start: int, count: int, columns: tuple[int, ...]) -> pd.DataFrame:
+        """Return up to ``count`` rows from a row on, of some columns, out of one row group."""
+        ends = np.cumsum(self.group_rows)
+        group = int(np.searchsorted(ends, start, side="right"))
+        before = int(ends[group]) - self.group_rows[group]
+        chosen = [self.names[k] for k in columns]
+        rows = self._file.read_row_group(group, columns=chosen)
+        first = max(0, min(start - before, len(rows) - count))
+        frame = rows.slice(first, count).to_pandas(types_mapper=pd.ArrowDtype, ignore_metadata=True)
+        out: pd.DataFrame = frame[chosen]
+        return out
+
 
 class CsvSource:
     """A text table, whose columns are text."""

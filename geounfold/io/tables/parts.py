@@ -81,7 +81,7 @@ def parts_of(path: str | Path) -> list[Part]:
         The file is missing, of another format or not a table, or the files' columns differ.
     """
     path = Path(path)
-    files = _files(path) if path.is_dir() else [path]
+    files = files_in(path) if path.is_dir() else [path]
     found: list[Part] = []
     row = 0
     for file in files:
@@ -95,7 +95,7 @@ def parts_of(path: str | Path) -> list[Part]:
     return found
 
 
-def _files(folder: Path) -> list[Path]:
+def files_in(folder: Path) -> list[Path]:
     """Return a folder's tables by name, without names that begin with a point or underscore."""
     files = [f for f in sorted(folder.iterdir()) if f.is_file() and f.name[0] not in "._"]
     endings = {ending(f) for f in files}

@@ -68,7 +68,7 @@ def sheet_stages(body: PreparedBody, datum: str, shell: float) -> SheetResult:
         with within(0.08, 0.5):
             trials = _fitted(case)
         outline = _outline(body, case)
-        plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell)
+        plan = MeshPlan(body.flatten, datum, body.sheet_options.mesh_cell, shell, body.count)
 
         def build(trial: Trial, misfit: float) -> tuple[FittedSheet, Horizons, SheetMesh]:
             fitted = conform(trial.fitted, medial.scaled(unit), parameters)

@@ -6,7 +6,27 @@ space, and keep their lengths.  `carried_hull` carries it, `signs` measures it, 
 word and the reasons.
 """
 
-from geounfold.quality.trust.judge import WORDS, Reason, Trust, grade, judge, score
+from geounfold.quality.trust.judge import (
+    WORDS,
+    Reason,
+    Trust,
+    grade,
+    judge,
+    judge_counted,
+    out_of_layer,
+    score,
+)
 from geounfold.quality.trust.signs import Signs, measure_signs
 
-__all__ = ["WORDS", "Reason", "Signs", "Trust", "grade", "judge", "measure_signs", "score"]
+__all__ = [
+    "WORDS",
+    "Reason",
+    "Signs",
+    "Trust",
+    "grade",
+    "judge",
+    "judge_counted",
+    "measure_signs",
+    "out_of_layer",
+    "score",
+]

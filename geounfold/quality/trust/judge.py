@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from geounfold.body.working_frame import Frame
-from geounfold.geometry.mesh import Floats
+from geounfold.geometry.mesh import Bools, Floats
 from geounfold.quality.trust.signs import Signs
 
 WORDS = ("good", "fair", "poor")
@@ -242,6 +242,30 @@ def judge(
     stratigraphic : (n,) float
         Their levels; NaN for those without an image.
     """
+    beyond = out_of_layer(stratigraphic)
+    return judge_counted(bodies, names, frame, points[beyond], float(beyond.mean()))
+
+
+def out_of_layer(stratigraphic: Floats) -> Bools:
+    """Return which blocks lie more than a quarter of the thickness out of the layer, (n,)."""
+    out: Bools = (stratigraphic < _BEYOND[0]) | (stratigraphic > _BEYOND[1])
+    return out
+
+
+def judge_counted(
+    bodies: Sequence[Signs], names: Sequence[str], frame: Frame, beyond: Floats, share: float
+) -> Trust:
+    """Return the trust of a run from the blocks out of the layer.
+
+    Parameters
+    ----------
+    bodies, names, frame
+        As `judge` takes them.
+    beyond : (k, 3) float
+        Blocks that `out_of_layer` names, in the data's coordinates.
+    share : float
+        Their share of all blocks.
+    """
     found: list[tuple[float, Reason | None]] = []
     for signs, name in zip(bodies, names, strict=True):
         for criterion in CRITERIA:
@@ -250,9 +274,8 @@ def judge(
             where = None if place is None else _place(frame.to_world(place.folded[None])[0])
             blocks = 0 if place is None else round(place.volume)
             found.append((criterion.excess(value), criterion.reason(value, where, blocks, name)))
-    beyond = (stratigraphic < _BEYOND[0]) | (stratigraphic > _BEYOND[1])
-    share, count = float(beyond.mean()), int(beyond.sum())
-    where = _place(np.median(points[beyond], axis=0)) if count else None
+    count = len(beyond)
+    where = _place(np.median(beyond, axis=0)) if count else None
     found.append((OUT.excess(share), OUT.reason(share, where, count)))
     told = [(excess, reason) for excess, reason in found if reason is not None]
     told.sort(key=lambda pair: (-WORDS.index(pair[1].word), -pair[0]))

@@ -73,12 +73,15 @@ class MeshPlan:
         Side of the footprint's cells, in blocks.
     shell : float
         Distance, in blocks, to which the shell reaches past the control mesh.
+    count : int or None
+        Number of blocks of the body, if those at its surface alone are held.
     """
 
     flatten: Flatten
     datum: str = "mid"
     cell: float = CELL
     shell: float = SHELL
+    count: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,7 +432,7 @@ def build_control(
     if not (_room(columns, _FOCAL) < reach).any():
         rungs.insert(0, ("constant", constant))
     with within(0.5, 1.0):
-        climbed = climb(rungs, blocks)
+        climbed = climb(rungs, blocks, plan.count)
     columns, laid = climbed.columns, climbed.laid
     heights = {"mid": np.zeros(columns.count), "top": columns.high, "bottom": columns.low}
     surfaces = {name: columns.surface(laid.layers, height) for name, height in heights.items()}

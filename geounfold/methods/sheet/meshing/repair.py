@@ -128,6 +128,7 @@ class _Exam:
 def climb(
     rungs: Iterable[tuple[str, Callable[[], tuple[Columns, Layers]]]],
     points: Floats,
+    count: int | None = None,
 ) -> Climbed:
     """Return the first rung's prisms that are proved and hold every block.
 
@@ -142,7 +143,10 @@ def climb(
         tried if that could not be proved or mended.
     points : (n, 3) float
         The blocks, working units.
+    count : int, optional
+        Number of blocks of the body, if ``points`` are those at its surface alone.
     """
+    count = count or len(points)
     records: list[Rung] = []
     held: list[tuple[int, int, int, Columns, Laid]] = []
     flawed: list[tuple[int, int, Columns, Layers, _Exam]] = []
@@ -167,7 +171,7 @@ def climb(
         if laid is None:
             hopeless.add(name)
             continue
-        laid, outside, lost = _covering(laid, points)
+        laid, outside, lost = _covering(laid, points, count)
         records[-1] = replace(records[-1], outside=outside, lost=lost)
         held.append((lost, outside, len(held), columns, laid))
         if not lost:
@@ -176,7 +180,7 @@ def climb(
         columns, laid = min(held, key=lambda found: found[:3])[3:]
         return Climbed(columns, laid, True, tuple(records))
     _, _, columns, layers, exam = min(flawed, key=lambda found: found[:2])
-    return _shrunk(columns, layers, exam, records, points)
+    return _shrunk(columns, layers, exam, records, points, count)
 
 
 def _blended(
@@ -205,21 +209,22 @@ def _blended(
     return columns, laid, exam.rung("blended", step)
 
 
-def _covering(laid: Laid, points: Floats) -> tuple[Laid, int, int]:
+def _covering(laid: Laid, points: Floats, count: int) -> tuple[Laid, int, int]:
     """Return the prisms extended to hold a few points that lie outside them.
 
     Tents are raised over points outside the shell, and tetrahedra of the shell that hold points
     become the body's.  If many points are outside, those in the shell stay there.  Also returned:
-    the number of points outside the body's tetrahedra, and of those in no tetrahedron.
+    the number of points outside the body's tetrahedra, and of those in no tetrahedron.  ``count``:
+    number of blocks of the body.
     """
     missed = points[TetIndex(laid.folded, laid.T).locate(points) < 0]
     if not len(missed):
         return laid, 0, 0
     lost = missed[_in_shell(laid, missed) < 0]
-    if len(lost) <= _TENTS * len(points):
+    if len(lost) <= _TENTS * count:
         laid, left = with_tents(laid, lost)
         lost = lost[left]
-    if len(missed) > _FEW * len(points):
+    if len(missed) > _FEW * count:
         return laid, len(missed), len(lost)
     held = _in_shell(laid, missed)
     return laid.taking_in(np.unique(held[held >= 0])), len(lost), len(lost)
@@ -250,6 +255,7 @@ def _shrunk(
     exam: _Exam,
     records: list[Rung],
     points: Floats,
+    count: int,
 ) -> Climbed:
     """Return prisms with offsets shrunk until they are proved; unchanged if they never are."""
     first, mean = layers, neighbour_mean(layers.F, len(layers.P))
@@ -259,7 +265,7 @@ def _shrunk(
         layers = shrink(layers, np.unique(exam.vertices % len(layers.P)), mean)
         laid, exam = _proved(columns, layers)
         if laid is not None:
-            laid, outside, lost = _covering(laid, points)
+            laid, outside, lost = _covering(laid, points, count)
             records.append(replace(exam.rung("shrunk", step), outside=outside, lost=lost))
             return Climbed(columns, laid, True, tuple(records))
     records.append(exam.rung("shrunk", shrinks))

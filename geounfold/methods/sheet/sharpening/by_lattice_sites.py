@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 from scipy.special import expit
 
+from geounfold.geometry.measures import bounds
 from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.methods.sheet.mid_surface.fit import RIDGE, FittedSheet
 from geounfold.methods.sheet.mid_surface.normal_equations import Stencils, gram
@@ -48,6 +49,13 @@ _OFF = 0.75
 Such a sheet is off by half a cell where it bends. With 1.25 blocks for cells of four, empty sites
 beyond the hinges of two million blocks counted as holes: 1.09 million sites were used in place of
 0.2 million, and the two attempts to sharpen took 29 s of processor.
+"""
+
+_MANY = 500_000
+"""Number of sites above which a tenth of them is placed on the sheet, and marks the rim's cells.
+
+Of ten million blocks with 1.8 million sites it takes 0.6 s of processor in place of 7.8; the
+unfolded blocks come out 0.17 blocks from the truth in place of 0.20.
 """
 
 _LEAST_SHARE = 0.1  # least share of the sites far from the rim that is used
@@ -158,6 +166,22 @@ def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:
     most = _ENOUGH * fitted.sheet.grid.size
     if fitted.unit <= 1 or len(sites.points) <= most:
         return sites
+    spread = scatter(sites.points)
+    if len(sites.points) > _MANY:
+        sampled = spread < _LEAST_SHARE
+        some = Sites(sites.points[sampled], sites.occupied[sampled])
+        kept = sampled | _in_cells_of(
+            sites.points, some.points[~_spare(fitted, some, rules)], fitted.unit
+        )
+    else:
+        spare = _spare(fitted, sites, rules)
+        share = (most - (~spare).sum()) / max(int(spare.sum()), 1)
+        kept = ~spare | (spread < max(share, _LEAST_SHARE))
+    return Sites(sites.points[kept], sites.occupied[kept])
+
+
+def _spare(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Bools:
+    """Return which sites lie far from the rim and in thick parts of the layer."""
     grid, rim = fitted.sheet.grid, 2 * (RIM + fitted.unit)
     foot = fitted.sheet.search(fitted.near, reach=8.0 * fitted.unit).feet(sites.points)
     flat = foot.U - foot.t[:, None] * grid.value(fitted.slip, foot.U)
@@ -168,9 +192,16 @@ def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:
     holes = cKDTree(flat[inside & ~sites.occupied])
     spare = seen & (half > _THICK * rules.thin)
     spare[spare] = holes.query(flat[spare], distance_upper_bound=rim)[0] > rim
-    share = (most - (~spare).sum()) / max(int(spare.sum()), 1)
-    kept = ~spare | (scatter(sites.points) < max(share, _LEAST_SHARE))
-    return Sites(sites.points[kept], sites.occupied[kept])
+    return spare
+
+
+def _in_cells_of(points: Floats, others: Floats, side: float) -> Bools:
+    """Return which points (n, 3) lie in a cubic cell of a side that holds one of some others."""
+    cells, places = (np.floor(X / side).astype(np.int64) for X in (points, others))
+    low, high = bounds(cells)
+    table = np.zeros(high - low + 1, dtype=bool)
+    table[tuple((places - low).T)] = True
+    return np.asarray(table[tuple((cells - low).T)])
 
 
 def _for_thin(fitted: FittedSheet, rules: SiteRules) -> tuple[FittedSheet, SiteRules]:

@@ -94,7 +94,9 @@ def add_unfold(commands: Any) -> Parser:
         "--engine",
         choices=ENGINES,
         default=ENGINES[0],
-        help="memory: all rows at once; batches: a Parquet file or folder larger than memory",
+        rare=True,
+        help="memory: all rows at once; batches: a Parquet file or folder, row by row; auto "
+        "(default): batches from 4 million rows on",
     )
     group = parser.section("samples and drill-holes")
     group.add("--samples", metavar="P", help="other points to carry, in any format of POINTS")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from geounfold.body.fault_surface import LIMIT_TOUCHES, FaultSurface, FaultWalls
 from geounfold.body.prepare import BodyPoints
@@ -17,6 +16,10 @@ from geounfold.body.working_frame import Frame
 from geounfold.errors import InputError, OptionError
 from geounfold.faults.given import named_surfaces
 from geounfold.geometry.mesh import Floats, TriMesh
+from geounfold.io.coordinate_columns import numbers
+from geounfold.io.messages import listing
+from geounfold.io.packages.names import plain_name
+from geounfold.io.tables.files import read_table
 
 NEAR = 2.5  # blocks from a limit within which blocks lie at it
 _AT = 1.4  # the same from a limit that takes their faces: 0.9 blocks, and half a block
@@ -229,15 +232,15 @@ def _polygon(item: Any) -> tuple[str, Floats | None]:
         path = Path(item)
         if path.suffix.lower() != ".csv":
             return path.name, None
-        try:
-            table = pd.read_csv(path)
-            columns = {str(name).strip().lower(): name for name in table.columns}
-            corners = table[[columns["x"], columns["y"]]].to_numpy(dtype=np.float64)
-        except (OSError, ValueError, KeyError) as error:
+        table = read_table(path).frame
+        places = {plain_name(name): k for k, name in enumerate(table.columns)}
+        if not {"x", "y"} <= set(places):
             raise InputError(
-                f"{path}: a polygon is a .csv file with columns x and y, a corner per row: {error}"
-            ) from error
-        return path.stem, corners
+                f"{path}: a polygon is a .csv file with columns x and y, a corner per row; it has: "
+                f"{listing(table.columns)}"
+            )
+        at = (table.iloc[:, places[axis]] for axis in "xy")
+        return path.stem, np.column_stack([numbers(column, source=str(path)) for column in at])
     if isinstance(item, np.ndarray) and item.ndim == 2 and item.shape[1] == 2:
         return "polygon", np.asarray(item, dtype=np.float64)
     return "", None

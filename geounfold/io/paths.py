@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from geounfold.backends.system import files
 from geounfold.errors import InputError
 from geounfold.io.messages import shown
 
@@ -78,13 +79,14 @@ def ending(path: Path) -> str:
 
 
 def existing_file(path: Path) -> Path:
-    """Return the path of a file that can be read and is not empty.
+    """Return the path of a file that can be read and is not empty, in a form of any length.
 
     Raises
     ------
     InputError
         No such file, a directory, a pipe or device, not readable, or empty.
     """
+    path = files.reachable(path)
     try:
         if path.is_dir():
             raise InputError(f"{path}: is a directory, not a file")

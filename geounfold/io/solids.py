@@ -9,7 +9,7 @@ from typing import Any
 from geounfold.body.fill import FilledSolid, fill_between, fill_solid
 from geounfold.errors import OptionError
 from geounfold.geometry.mesh import TriMesh, as_trimesh
-from geounfold.io.paths import ending
+from geounfold.io.paths import ending, existing_file
 from geounfold.io.surfaces import holds_surface, read_surface
 
 SurfaceLike = Any
@@ -89,4 +89,5 @@ def is_wireframe(path: str | Path, element: str | None = None) -> bool:
     """
     if not holds_surface(path, element):
         return False
-    return ending(Path(path)) != ".ts" or b"\nTRGL" in Path(path).read_bytes()
+    path = existing_file(Path(path))
+    return ending(path) != ".ts" or b"\nTRGL" in path.read_bytes()

@@ -57,9 +57,8 @@ def read_surface_with_meta(
     path: str | Path, element: str | None = None
 ) -> tuple[TriMesh, Mapping[str, str]]:
     """Return the surface of a file, and its unit and coordinate reference if it holds them."""
-    path = Path(path)
+    path = existing_file(Path(path))
     kind = ending(path)
-    existing_file(path)
     if kind not in SURFACE_ENDINGS:
         usual = (".dxf", ".ts", ".stl", ".obj", ".ply", ".omf")
         raise InputError(wrong_kind(path, "surface", (*usual, *SURFACE_ENDINGS)))

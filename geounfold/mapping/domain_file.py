@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from geounfold.backends.system.files import reachable
 from geounfold.errors import InputError
 from geounfold.mapping.map_file import write_whole
 
@@ -27,7 +28,7 @@ _DATE = (1980, 1, 1, 0, 0, 0)  # so that the same maps give the same bytes
 def holds_domains(path: str | Path) -> bool:
     """Return whether a file holds the maps of several domains."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(reachable(Path(path))) as archive:
             names = archive.namelist()
     except (OSError, ValueError, zipfile.BadZipFile):
         return False
@@ -67,7 +68,7 @@ def read_domains(path: str | Path) -> tuple[str, dict[str, bytes]]:
         The file is missing, damaged, or of another version.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(reachable(Path(path))) as archive:
             members = {info.filename: info for info in archive.infolist()}
             if any(
                 info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1

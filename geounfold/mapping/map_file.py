@@ -254,6 +254,7 @@ def _left_out(names: set[str]) -> Arrays:
 
 def _content(path: Path) -> bytes:
     """Return the bytes of a regular file of a plausible size."""
+    path = files.reachable(path)
     try:
         if path.is_dir():
             raise InputError(f"{path}: is a directory, not a map file")

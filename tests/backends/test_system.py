@@ -9,13 +9,21 @@ import subprocess
 import sys
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+import pandas as pd
 import pytest
 
+import geounfold as gu
 from geounfold.backends.system import console, files, memory, processors, worker
-from geounfold.errors import OutputError
-from geounfold.io import Outputs
+from geounfold.errors import InputError, OutputError
+from geounfold.geometry.mesh import TriMesh
+from geounfold.io import Outputs, read_points, read_surface, write_surface
 from geounfold.io.paths import ending
+from geounfold.io.solids import is_wireframe
+from geounfold.io.tables import large
+from geounfold.mapping import domain_file
+from tests.body.fill.solids import box
 from tests.hostile.environment import LONG, with_fault
+from tests.shapes import grid_cells
 
 
 @pytest.mark.parametrize(
@@ -256,3 +264,29 @@ def test_letter_case_is_ignored_as_there(system: str, tmp_path: Path) -> None:
     )
     assert "--output and --map name the same file" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_long_paths_of_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Readers open the path that `reachable` returns: here in another folder, on Windows a long one.
+    short = Path("blocks.csv")
+    assert files.reachable(short, windows=False) == short
+    assert files.reachable(short, windows=True) == short
+    long = files.reachable(Path("a" * 300 + ".csv"), windows=True)
+    assert str(long).startswith("\\\\?\\")
+    assert str(long).endswith("aaa.csv")
+
+    def gone(path: Path) -> Path:
+        return tmp_path / path.name
+
+    pd.DataFrame(grid_cells(5, 4, 3), columns=list("xyz")).to_csv(tmp_path / "b.csv", index=False)
+    V, F = box((0, 0, 0), (4.0, 3.0, 2.0), cell=1.0)
+    write_surface(tmp_path / "s.ts", TriMesh(V, F))
+    monkeypatch.setattr(files, "reachable", gone)
+    for module in (large, domain_file):
+        monkeypatch.setattr(module, "reachable", gone)
+    there = tmp_path / "elsewhere"  # is no folder: only the other path can be opened
+    assert len(read_points(there / "b.csv")) == 60
+    assert len(read_surface(there / "s.ts").F) == len(F)
+    assert is_wireframe(there / "s.ts")
+    with pytest.raises(InputError, match="not a geounfold map"):
+        gu.load(there / "b.csv")

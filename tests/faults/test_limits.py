@@ -135,5 +135,8 @@ def test_limits_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     )
     assert main([*run, "--overwrite", "--limits", str(tmp_path / "absent.ts")]) == 2
     assert "absent.ts" in capsys.readouterr().err
+    (tmp_path / "k.csv").write_text("east;north\n1;2\n")
+    assert main([*run, "--overwrite", "--limits", str(tmp_path / "k.csv")]) == 2
+    assert "with columns x and y, a corner per row; it has: east, north" in capsys.readouterr().err
     assert main([*run, "--overwrite", "--limits", ",20,,,,", "--by", "x"]) == 2
     assert "--limits are of one body" in capsys.readouterr().err

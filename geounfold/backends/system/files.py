@@ -179,6 +179,23 @@ def unlimited(path: Path) -> Path:
     return Path(unlimited_name(str(path))) if WINDOWS else path
 
 
+def reachable(path: Path, *, windows: bool = WINDOWS) -> Path:
+    r"""Return the path of an input that Windows opens too if it is longer than 260 characters.
+
+    Other systems, and shorter paths, keep theirs.
+
+    Examples
+    --------
+    >>> reachable(Path("blocks.csv"), windows=True).name
+    'blocks.csv'
+    """
+    if not windows:
+        return path
+    whole = os.path.abspath(path)  # noqa: PTH100  (the long form takes neither .. nor /)
+    name = unlimited_name(whole)
+    return path if name == whole else Path(name)
+
+
 def unlimited_name(name: str) -> str:
     r"""Return an absolute path of Windows in the form that has no limit of length.
 

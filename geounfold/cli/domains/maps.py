@@ -36,7 +36,7 @@ def load_map(args: Namespace, path: str | None = None) -> UnfoldingMap | DomainM
     from geounfold.mapping.domain_file import holds_domains
 
     path = args.map if path is None else path
-    existing_file(Path(path))
+    path = str(existing_file(Path(path)))
     domain = getattr(args, "domain", None)
     if not holds_domains(path):
         for option in ("domain", "by"):

@@ -93,9 +93,8 @@ def read_table(
     MissingDependencyError
         The format's library is not installed.
     """
-    path = Path(path)
+    path = existing_file(Path(path))
     kind = ending(path)
-    existing_file(path)
     if kind == ".parquet" or (kind in TEXT_ENDINGS and not is_gslib(path, kind)):
         if element is not None:
             raise no_elements(path)

@@ -20,6 +20,7 @@ from typing import IO, Any, Protocol, cast
 import numpy as np
 import pandas as pd
 
+from geounfold.backends.system.files import reachable
 from geounfold.body.check import count_duplicates
 from geounfold.errors import InputError
 from geounfold.geometry.measures import LARGEST_COORDINATE
@@ -349,7 +350,7 @@ def open_points(  # 9 parameters: the choices of columns, rows and element, and 
 
 def _large(path: Path, columns: Triple | None) -> Source | None:
     """Return the rows of a large table; None for a small or damaged file, or another format."""
-    kind = ending(path)
+    path, kind = reachable(path), ending(path)
     if kind not in (".parquet", *TEXT_ENDINGS) or not path.is_file():
         return None
     try:

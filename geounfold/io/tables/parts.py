@@ -107,8 +107,8 @@ def files_in(folder: Path) -> list[Path]:
 
 def _split(path: Path, row: int) -> tuple[list[Part], int]:
     """Return a file's parts and its number of rows; ``row`` rows of other files come before."""
+    path = existing_file(path)
     kind = ending(path)
-    existing_file(path)
     if kind not in (".csv", ".parquet"):
         raise InputError(
             f"{path}: cannot be read in parts; give .parquet, .csv or a folder of them"

@@ -44,8 +44,8 @@ def coarsest_cells(
     --------
     >>> k = np.stack(np.meshgrid(*[np.arange(12)] * 3, indexing="ij"), -1).reshape(-1, 3)
     >>> found = coarsest_cells(k * 5.0, Lattice(np.eye(3), np.full(3, 5.0), 1.0), None)
-    >>> len(found.points), found.lattice.steps.tolist()
-    (216, [10.0, 10.0, 10.0])
+    >>> len(found.points), found.lattice.steps.tolist(), found.joined
+    (216, [10.0, 10.0, 10.0], 2)
     """
     if lattice is None:
         return None
@@ -63,7 +63,8 @@ def coarsest_cells(
     coarse = Lattice(own.axes, own.steps * joined, own.share, origin)
     home = row if filled is None else row[filled.home]
     places = (box.cells_of(box.keys) * coarse.steps) @ coarse.axes + origin
-    return FilledCells(coarse, places, home, filled is not None and filled.sub_blocked)
+    sub_blocked = filled is not None and filled.sub_blocked
+    return FilledCells(coarse, places, home, sub_blocked, joined)
 
 
 def _joinable(cells: Ints) -> int | None:

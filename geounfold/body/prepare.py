@@ -50,6 +50,8 @@ class PreparedPoints:
         without a lattice.
     moved : float
         How far at most rounded coordinates were moved, in their unit.
+    joined : int
+        How many blocks were joined to one cell along every axis.
     """
 
     points: Floats
@@ -61,6 +63,7 @@ class PreparedPoints:
     division: Division | None = None
     cells: Ints | None = None
     moved: float = 0.0
+    joined: int = 1
 
     @property
     def bodies(self) -> int:
@@ -182,8 +185,9 @@ def prepare(
     chosen = np.isin(labels, [own[group[0]] for group in groups])
     taken = None if frame.steps is None else frame.nearest_cells(work[chosen])
     moved = 0.0 if told is points else float(np.abs(points - told).max())
+    joined = 1 if cells is None else cells.joined
     prepared = PreparedPoints(
-        points, given, frame, lattice, groups, record, cells=taken, moved=moved
+        points, given, frame, lattice, groups, record, cells=taken, moved=moved, joined=joined
     )
     return _divided(prepared, bodies) if parts else (prepared, bodies)
 

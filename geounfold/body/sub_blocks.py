@@ -64,12 +64,15 @@ class FilledCells:
         For every input point, the row of a cell at or in its block.
     sub_blocked : bool
         Whether blocks of several sides were found.
+    joined : int
+        How many cells of the points' own lattice a cell has along every axis.
     """
 
     lattice: Lattice
     points: Floats
     home: Ints
     sub_blocked: bool
+    joined: int = 1
 
 
 def filled_cells(points: Floats, lattice: Lattice | None) -> FilledCells | None:

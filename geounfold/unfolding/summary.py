@@ -117,7 +117,7 @@ class RunRecord:
             return None
         sides = np.ptp(cells, axis=0) + 1
         full = len(cells) >= np.prod(sides.astype(np.float64))
-        return [int(side) for side in sides] if full else None
+        return [int(side) * self.prepared.joined for side in sides] if full else None
 
     @property
     def outside(self) -> int:
@@ -264,7 +264,7 @@ def body_volume(run: RunRecord) -> dict[str, float | None]:
     folded = len(prepared.cells) * prepared.frame.scale**3
     ratio = run.measured.quality.blocks.volume_ratio[np.concatenate(prepared.groups)]
     known = ratio[np.isfinite(ratio)]
-    alike = len(prepared.cells) == prepared.chosen and len(known) > 0
+    alike = len(prepared.cells) * prepared.joined**3 == prepared.chosen and len(known) > 0
     return {"folded": folded, "unfolded": folded * float(known.mean()) if alike else None}
 
 
@@ -344,7 +344,7 @@ def _lattice(run: RunRecord) -> dict[str, Any]:
     spacing = run.prepared.frame.scale
     if run.prepared.lattice is None:
         return {"found": False, "spacing": spacing}
-    steps = run.prepared.lattice.steps.tolist()
+    steps = (run.prepared.lattice.steps / run.prepared.joined).tolist()
     return {"found": True, "spacing": spacing, "steps": steps, "full_box": run.full_box}
 
 

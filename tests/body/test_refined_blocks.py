@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+import geounfold as gu
 from geounfold.body.coarsest_cells import coarsest_cells
 from geounfold.body.lattice import measure_lattice, refined
 from geounfold.body.prepare import prepare
@@ -52,8 +53,20 @@ def test_blocks_that_all_are_split_are_joined_again(count: int) -> None:
     points = split(blocks, (count,) * 3)
     found = solid(points)
     assert np.allclose(found.lattice.steps, SIDE)
+    assert found.joined == count
     np.testing.assert_allclose(np.sort(found.points, axis=0), np.sort(blocks, axis=0), atol=1e-6)
     check_home(points, found, np.full(3, SIDE))
+
+
+def test_the_summary_has_the_sides_of_the_blocks_given() -> None:
+    """A slab of blocks of 5 that were joined to cells of 10."""
+    u = gu.unfold(grid_cells(20, 20, 10) * 5.0)
+    assert u.frame.scale == pytest.approx(10.0)
+    summary = u.summary()
+    assert summary["lattice"]["steps"] == pytest.approx([5.0] * 3)
+    assert sorted(summary["lattice"]["full_box"]) == [10, 20, 20]
+    assert summary["body_volume"]["folded"] == pytest.approx(20 * 20 * 10 * 125)
+    assert summary["body_volume"]["unfolded"] == pytest.approx(20 * 20 * 10 * 125, rel=1e-3)
 
 
 def test_one_part_that_is_missing_keeps_the_parts() -> None:

@@ -57,7 +57,8 @@ class Finding:
 
     def __str__(self) -> str:
         where = f": {self.where}" if self.where else ""
-        return f"{self.source}: {self.check}{where}; {self.action}"
+        action = f"; {self.action}" if self.action else ""
+        return f"{self.source}: {self.check}{where}{action}"
 
 
 @dataclass

@@ -141,7 +141,7 @@ def read_hole_table(
     else:
         source, table = str(given), read_table(given)
         for line in table.notes:
-            log.add(source, line, NOTE, "so it was read")
+            log.add(source, line, NOTE, "")
     names = [str(name) for name in table.frame.columns]
     fields = _fields(kind, names, columns, source)
     row = np.arange(1, len(table.frame) + 1)

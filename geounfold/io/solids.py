@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from geounfold.body.fill import FilledSolid, fill_between, fill_solid
-from geounfold.errors import OptionError
+from geounfold.errors import InputError, OptionError
 from geounfold.geometry.mesh import TriMesh, as_trimesh
 from geounfold.io.paths import ending, existing_file
-from geounfold.io.surfaces import holds_surface, read_surface
+from geounfold.io.surfaces import holds_surface, points_alone, read_surface
 
 SurfaceLike = Any
 """A TriMesh, (V, F), a file of a surface, or a pyvista.PolyData."""
@@ -68,6 +68,11 @@ def fill(
     if (solid is None) == (top is None and bottom is None) or (top is None) != (bottom is None):
         raise OptionError("fill takes a closed surface, or top and bottom")
     if solid is not None:
+        if isinstance(solid, str | Path) and points_alone(Path(solid)):
+            raise InputError(
+                f"{solid}: holds points without triangles, which enclose nothing: fill takes a "
+                "closed mesh; blocks are unfolded as they are"
+            )
         return fill_solid(surface_of(solid, element), block_size, sub_blocks)
     return fill_between(surface_of(top), surface_of(bottom), block_size, sub_blocks)
 

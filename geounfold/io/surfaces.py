@@ -139,6 +139,14 @@ def write_surface(path: str | Path, mesh: TriMesh, meta: Mapping[str, str] | Non
         raise OutputError(f"{path}: unknown kind of surface '{kind}'; files end in {known}")
 
 
+def points_alone(path: Path) -> bool:
+    """Return whether a file is a table of points without triangles."""
+    if ending(path) not in TABLE_ENDINGS:
+        return False
+    names = {str(name).strip().casefold() for name in read_table(path).frame.columns}
+    return not names & {"v0", "v1", "v2", "v3"}
+
+
 def _from_table(path: Path) -> TriMesh:
     """Return the surface of a table with or without triangles."""
     table = read_table(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -132,6 +133,16 @@ def test_bad_rows_are_named_and_left_out_or_cut(case: str) -> None:
     with pytest.raises(InputError, match=rf"data row {first}\b.*--strict"):
         read_drillholes(*given, strict=True)
     read_drillholes(*frames(**GOOD), strict=True)
+
+
+def test_what_was_assumed_in_reading_is_a_sentence(tmp_path: Path) -> None:
+    names = []
+    for table, name in zip(one_hole(), ("collar", "survey", "assay"), strict=True):
+        table.to_csv(tmp_path / f"{name}.csv", index=False, sep=";", decimal=",")
+        names.append(tmp_path / f"{name}.csv")
+    told = [line for line in read_drillholes(*names).messages() if "decimal" in line]
+    assert told
+    assert all(line.endswith("its decimal commas were read as points") for line in told)
 
 
 def test_a_code_in_a_collar_is_named_and_kept() -> None:

@@ -77,8 +77,17 @@ class Parser(argparse.ArgumentParser):
             valid = (
                 self._flags() if flag else list(self._commands.choices if self._commands else ())
             )
-            message = f"{message.partition(' (choose')[0]}{nearest(flag or command, valid)}"
+            near = self._owners(flag) if flag in valid else nearest(flag or command, valid)
+            message = f"{message.partition(' (choose')[0]}{near}"
         raise OptionError(f"{message} (see '{self.prog} --help')")
+
+    def _owners(self, flag: str) -> str:
+        """Return which commands have a flag that the command given has not."""
+        commands = self._commands.choices if self._commands else {}
+        names = [
+            n for n, p in commands.items() if any(flag in a.option_strings for a in p._actions)
+        ]
+        return f" ({flag} is an option of {', '.join(names)})"
 
     def _flags(self) -> list[str]:
         """Return the long flags of this parser and of its commands."""

@@ -20,7 +20,7 @@ from geounfold.io.result_columns import UNFOLDED
 from geounfold.io.tables.parted import ELSEWHERE, NOT_SELECTED
 
 if TYPE_CHECKING:
-    from geounfold.geometry.mesh import Bools
+    from geounfold.geometry.mesh import Bools, Floats
 
 
 def run(args: Namespace, console: Console) -> None:
@@ -44,11 +44,23 @@ def run(args: Namespace, console: Console) -> None:
         existing_file(Path(args.points))
         picture = _draw_map(args.points, console)
     else:
+        _check_points(args)
         picture = _draw_points(read(args.points, args, console), args.colour, console)
     with outputs.writing() as parts:
         parts["--output"].write_bytes(picture)
     console.done(f"drawn into {args.output}")
     console.answer({"output": args.output})
+
+
+def _check_points(args: Namespace) -> None:
+    """Raise InputError for a surface."""
+    from geounfold.io.solids import is_wireframe
+
+    if is_wireframe(existing_file(Path(args.points)), args.element):
+        raise InputError(
+            f"{args.points}: is a surface; view draws points and maps (.npz): `geounfold fill` "
+            "makes the blocks of a closed surface"
+        )
 
 
 def _draw_map(path: str, console: Console) -> bytes:
@@ -75,7 +87,7 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
     there = _with_image(table)
     if not there.all():
         console.warn(f"{table.source}: {np.count_nonzero(~there)} points without an image left out")
-    values = table.numbers(label)
+    values = _colours(table, label)
     if not np.isfinite(values[there]).all():
         missing = np.flatnonzero(there & ~np.isfinite(values))
         raise InputError(
@@ -94,6 +106,15 @@ def _draw_points(table: PointTable, colour: str | None, console: Console) -> byt
             look |= {"titles": titles}
             return png(bodies.draw_bodies(table.points[there], twin, values[there], label, **look))
     return png(bodies.draw_body(table.points[there], values[there], label, **look))
+
+
+def _colours(table: PointTable, label: str) -> Floats:
+    """Return the numbers of a column; a column of words is an error that lists the others."""
+    try:
+        return table.numbers(label)
+    except InputError as error:
+        others = listing(_number_columns(table))
+        raise InputError(f"{error}; --colour takes a column of numbers: {others}") from error
 
 
 def _number_columns(table: PointTable) -> list[str]:

@@ -73,6 +73,8 @@ def test_fill_takes_two_surfaces(solid):
         ("fill solid.ply --block-size 0.001", "--block-size 0.001 x 0.001 x 0.001 makes about"),
         ("fill solid.ply --sub-blocks 3", "--sub-blocks needs 1, 2, 4 or 8"),
         ("fill none.ply", "none.ply: no such file"),
+        ("fill p.csv", "p.csv: holds points without triangles, which enclose nothing"),
+        ("fill solid.ply --where x>3", "(--where is an option of unfold, map, estimate,"),
         ("unfold solid.ply --where x>1", "--where needs block centroids, not surfaces"),
         ("unfold solid.ply --origin 0,0,0", "--origin needs block centroids, not surfaces"),
         ("unfold p.csv --block-size 5", "--block-size needs a closed surface; p.csv holds points"),
@@ -84,6 +86,11 @@ def test_wrong_input_is_one_line(solid, capsys, words, said):
     line = capsys.readouterr().err
     assert said in line
     assert line.count("\n") == 1
+
+
+def test_a_surface_is_not_drawn(solid, capsys):
+    assert main(["view", "solid.ply", "-o", "p.png"]) == 2
+    assert "solid.ply: is a surface; view draws points and maps (.npz)" in capsys.readouterr().err
 
 
 def test_unfold_takes_a_solid_in_one_command(solid):

@@ -23,7 +23,8 @@ def test_view_asks_for_numbers(
     assert main(["view", "p.csv", "-o", "p.png", "--colour", "id"]) == 2
     assert "data row 2" in capsys.readouterr().err
     assert main(["view", "p.csv", "-o", "p.png", "--colour", "location"]) == 2
-    assert "not numeric" in capsys.readouterr().err
+    assert "not numeric" in (said := capsys.readouterr().err)
+    assert "--colour takes a column of numbers: " in said
 
 
 def test_view_draws_both_spaces(

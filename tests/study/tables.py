@@ -138,6 +138,36 @@ def calibration(told: dict[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(rows).T
 
 
+def repeated(told: dict[str, pd.DataFrame]) -> tuple[float, int]:
+    """Return the correlation of the gains of two draws of one cell, and the number of pairs."""
+    whole = pd.concat(told, names=["arm"])["realised"]
+    pairs = whole.unstack("seed").dropna()
+    if pairs.shape[1] < 2 or len(pairs) < 3:
+        return float("nan"), 0
+    return float(pairs.iloc[:, 0].corr(pairs.iloc[:, 1])), len(pairs)
+
+
+def with_left_out(told: dict[str, pd.DataFrame], left_out: pd.DataFrame) -> float:
+    """Return the correlation of realised gains with those told by the forecast and left-out holes.
+
+    The gains are a sum of both, with weights fitted to a half of the runs that is drawn; the
+    correlation is that of the other half, a mean over 100 draws.
+    """
+    frame = pd.concat(told, names=["arm"])
+    back = 1 - np.exp(ratios(left_out))
+    at = frame.index.droplevel("arm")
+    arms = frame.index.get_level_values("arm")
+    own = np.array([back.loc[run, arm] for run, arm in zip(at, arms, strict=True)])
+    A, y = np.column_stack([frame["foretold"], own]), frame["realised"].to_numpy()
+    runs, number = np.unique(at, return_inverse=True)
+    rng, found = np.random.default_rng(0), []
+    for _ in range(100):
+        half = (rng.permutation(len(runs)) < len(runs) // 2)[number]
+        weights = np.linalg.lstsq(A[half], y[half])[0]
+        found.append(np.corrcoef(A[~half] @ weights, y[~half])[0, 1])
+    return float(np.mean(found))
+
+
 def markdown(frame: pd.DataFrame, form: str = ".3f", whole: tuple[str, ...] = ("runs",)) -> str:
     """Return a table in Markdown."""
     head = ["", *map(str, frame.columns)]
@@ -155,6 +185,7 @@ def report(table: pd.DataFrame, link: str | None = None) -> str:
     """Return all tables as one text."""
     errors, about = wide(table), cells(table)
     left_out = wide(table, "cv_rmse")
+    told = forecast(errors, about)
     text = [
         INTRODUCTION.read_text(encoding="utf-8"),
         f"`make study` makes this page: {len(errors)} runs of the 216 that it makes when it is "
@@ -181,10 +212,26 @@ def report(table: pd.DataFrame, link: str | None = None) -> str:
         "of the run: of one draw of the grades and 300 blocks, so that single runs scatter, and "
         "means over the nuggets and seeds of one body, spacing and range less. Nine of ten runs "
         "lie between the two bounds, which are those that `assess` prints.\n",
-        markdown(calibration(forecast(errors, about))),
+        markdown(calibration(told)),
+        *_limits(told, left_out),
         *([] if link is None else [f"![Foretold and realised gains]({link}/assess.png)\n"]),
     ]
     return "\n".join(text)
+
+
+def _limits(told: dict[str, pd.DataFrame], left_out: pd.DataFrame) -> list[str]:
+    """Return what limits the forecast of single runs; nothing if no cell was drawn twice."""
+    again, count = repeated(told)
+    if not count or not again > 0:
+        return []
+    return [
+        f"A forecast that does not see the draw cannot follow its scatter: the gains of two draws "
+        f"of one cell correlate by {again:.2f} ({count} pairs), so that the best such forecast "
+        f"would correlate by {np.sqrt(again):.2f} with single runs. The gain at left-out holes of "
+        "the same draw (150 samples) knows more: the forecast and that gain, with weights fitted "
+        f"to half of the runs, correlate by {with_left_out(told, left_out):.2f} with the other "
+        "half. `study-holes` shows both side by side.\n"
+    ]
 
 
 def _lognormal(errors: pd.DataFrame) -> int:

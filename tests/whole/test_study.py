@@ -62,6 +62,19 @@ def test_gains_of_known_errors(tmp_path: Path) -> None:
         assert (tmp_path / name).read_bytes()[:4] == b"\x89PNG"
 
 
+def test_what_limits_the_forecast(tmp_path: Path) -> None:
+    # Both draws of a cell gain alike, and left-out holes gain as blocks do: both correlate by 1.
+    known(tmp_path / "s.csv")
+    table = pd.read_csv(tmp_path / "s.csv")
+    own = table["arm"] == "geounfold"
+    table.loc[own, "rmse"] *= 1 - table["range"] / 1000 - table["nugget"]
+    table["cv_rmse"] = table["rmse"]
+    table.to_csv(tmp_path / "s.csv", index=False)
+    text = run("tables.py", str(tmp_path / "s.csv"))
+    assert "of one cell correlate by 1.00 (16 pairs)" in text
+    assert "half of the runs, correlate by 1.00 with the other half" in text
+
+
 @pytest.mark.slow
 def test_a_run_reaches_the_ceiling_and_goes_on(tmp_path: Path) -> None:
     pytest.importorskip("gstlearn", reason="the extra geostat is not installed")

@@ -23,6 +23,8 @@ from geounfold.geometry.mesh import Floats, Ints
 ISLANDS = 16
 """Targets per call: the cost per target is least at this number, and offsets stay small."""
 
+_BANDS = 400  # lines of the turning bands; a field's variance is then right to a few per cent
+
 _KINDS = {
     "spherical": "SPHERICAL",
     "exponential": "EXPONENTIAL",
@@ -177,6 +179,39 @@ def inverse_distance(offsets: Floats, values: Floats, counts: Ints, power: float
                 raise BackendError("gstlearn's inverse distances failed")
             estimate[rows] = target.getColumn("InvDist.v.estim")
     return estimate
+
+
+def turning_bands(
+    points: Floats, structures: Sequence[Part], axes: Floats, count: int, seed: int
+) -> Floats:
+    """Return simulated values (n, count) of mean 0 at points (n, 3), by turning bands.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+    structures : sequence of Part
+        Without a nugget; of none the values are 0.
+    axes : (3, 3) float
+        Directions of the ranges, as rows.
+    count : int
+    seed : int
+        1 or more: the library takes 0 for the state of its generator.
+
+    Raises
+    ------
+    BackendError
+        gstlearn failed.
+    """
+    if not len(structures):
+        return np.zeros((len(points), count))
+    gl = library()
+    model = _model(gl, _space(gl), 0.0, structures, 0.0, _angles(axes))
+    with _silence():
+        table = _table(gl, points, None)
+        if gl.simtub(None, table, model, None, count, seed, _BANDS):
+            raise BackendError("gstlearn's turning bands failed")
+    names = [name for name in table.getAllNames() if name.startswith("Simu")]
+    return np.column_stack([table.getColumn(name) for name in names])
 
 
 def _space(gl: ModuleType) -> Any:

@@ -3,8 +3,8 @@
 `variogram` holds the model and `fit` fits one to samples. `neighbourhood` selects the samples of
 each target. `kriging` estimates points in one space; `estimate` carries samples and blocks to the
 unfolded space and calls it. `exploration` computes the tables of exploratory data analysis.
-`scores` compares estimates with true values and sums up tonnage and metal. gstlearn (extra
-``geostat``) solves the kriging systems.
+`realisations` simulates grades that honour the samples. `scores` compares estimates with true
+values and sums up tonnage and metal. gstlearn (extra ``geostat``) solves the kriging systems.
 """
 
 from geounfold.estimation.declustering import Declustering, decluster

@@ -79,6 +79,8 @@ class Estimation:
         Blocks that are estimated as means; None for points at their centroids.
     others : mapping of Estimates
         Estimates by other methods from the same samples, by method.
+    realisations : (m, k) float or None
+        Conditional simulations (`realisations.with_realisations`); NaN as the estimates.
     """
 
     grade: str
@@ -95,6 +97,7 @@ class Estimation:
     position_error: tuple[float, float] | None = None
     support: BlockSupport | None = None
     others: Mapping[str, Estimates] = field(default_factory=dict)
+    realisations: Floats | None = None
 
     @property
     def columns(self) -> dict[str, Any]:
@@ -106,6 +109,12 @@ class Estimation:
             f"{grade}_variance": b.variance,
             **{f"{grade}_{n}": values for n, values in more.items() if values is not None},
             **{f"{grade}_{method}": found.estimate for method, found in self.others.items()},
+            **{
+                f"{grade}_r{k}": values
+                for k, values in enumerate(
+                    () if self.realisations is None else self.realisations.T, 1
+                )
+            },
             f"{grade}_samples": b.samples,
             f"{grade}_flag": b.flag,
             "location": self.carried.location,

@@ -146,6 +146,23 @@ def test_the_report_has_curves_swaths_tonnage_and_settings(files, tmp_path: Path
     assert "nine of ten samples lie within" in told
 
 
+def test_realisations_are_columns(files, tmp_path: Path, capsys) -> None:
+    out, how = tmp_path / "out.csv", ("--variogram", files["v.json"], "--quiet")
+    assert main(words(files, out, "--realisations", "2", *how)) == 0
+    got = pd.read_csv(out)
+    known = got.CU_flag == "estimated"
+    assert (got[["CU_r1", "CU_r2"]].notna().all(axis=1) == known).all()
+    assert got.CU_r1[known].std() > got.CU_estimate[known].std()  # estimates are smooth
+    capsys.readouterr()
+    for more, said in (
+        (("--realisations", "0"), "--realisations needs a whole number of 1 or more"),
+        (("--realisations", "2", "--block-size", "8,8,4"), "leave out --block-size"),
+        (("--realisations", "2", "--method", "nearest"), "--realisations need a variogram"),
+    ):
+        assert main(words(files, tmp_path / "no.csv", "--quiet", *more)) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_few_samples_are_flagged_and_told(files, tmp_path: Path, capsys) -> None:
     out = tmp_path / "out.csv"
     more = ("--variogram", files["v.json"], "--radii", "3,3,3", "--json")

@@ -131,6 +131,15 @@ def _add_method(parser: Parser) -> None:
         "--power", metavar="X", default="2", rare=True, help="power of inverse distance (default 2)"
     )
     group.add(
+        "--realisations",
+        metavar="N",
+        rare=True,
+        help="columns of so many conditional simulations of points: CU_r1, CU_r2 ...",
+    )
+    group.add(
+        "--seed", metavar="N", default="1", rare=True, help="seed of the realisations (default 1)"
+    )
+    group.add(
         "--workers", metavar="N", default="1", rare=True, help="number of processes (default 1)"
     )
 

@@ -58,16 +58,23 @@ def estimation(
     also = _also(args)
     variogram = None if args.variogram is None else variogram_file(args.variogram)
     off = None if args.position_error is None else _position_error(args.position_error)
+    count, seed = _realisations(args)
     from geounfold.estimation import estimate
 
     stage("estimating")
-    return estimate(
+    found = estimate(
         saved, sample_table(samples, args), blocks, variogram,
         grade=args.grade, method=args.method, neighbourhood=near,
         mean=mean, power=power, workers=workers, values=values_rules(args), cells=cells,
         soft_boundary=soft, all_blocks=args.all_blocks, position_error=off,
         block_size=size, discretise=parts, also=also,
     )  # fmt: skip
+    if count is None:
+        return found
+    from geounfold.estimation.realisations import with_realisations
+
+    stage("simulating")
+    return with_realisations(found, count, seed=seed)
 
 
 def summarised(
@@ -132,6 +139,18 @@ def _discretise(args: Namespace) -> tuple[int, int, int]:
         )
     a, b, c = (whole_number(word.strip(), "--discretise") for word in words)
     return a, b, c
+
+
+def _realisations(args: Namespace) -> tuple[int | None, int]:
+    """Return the number of --realisations, if any, and their seed."""
+    seed = whole_number(args.seed, "--seed")
+    if args.realisations is None:
+        return None, seed
+    if args.block_size is not None:
+        raise OptionError("--realisations are of points: leave out --block-size")
+    if args.method not in ("ordinary", "simple"):
+        raise OptionError("--realisations need a variogram: --method ordinary or simple")
+    return whole_number(args.realisations, "--realisations"), seed
 
 
 def _also(args: Namespace) -> list[Any]:

@@ -8,6 +8,7 @@ from geounfold.errors import SplitError
 from geounfold.methods.sheet import attempts
 from geounfold.methods.sheet.mid_surface.fit import FitSettings
 from geounfold.synthetic import Body, random_body
+from geounfold.synthetic.field_bodies import FIELD_BODIES
 
 
 def off(body: Body) -> tuple[float, gu.Unfolding]:
@@ -51,3 +52,14 @@ def test_another_fit_that_fails_leaves_the_first(monkeypatch: pytest.MonkeyPatch
     assert case.tried(FitSettings()) is None
     with pytest.raises(ValueError, match="other"):
         case.tried(FitSettings())
+
+
+def test_feather_edges_of_a_trough_are_followed() -> None:
+    # A syncline's fill under a level top; its level is known as built.  Mean error 0.029; when the
+    # sheet ran straight on past the edges, of one or two blocks, 0.101, with 5 % of the blocks more
+    # than a quarter of the thickness beyond top or bottom.
+    body = FIELD_BODIES["trough_closed"].blocks(0)
+    u = gu.unfold(body.points)
+    ways = (u.stratigraphic, 1 - u.stratigraphic)
+    assert min(np.abs(level - body.level).mean() for level in ways) < 0.05
+    assert (np.abs(u.stratigraphic - 0.5) > 0.75).mean() < 0.01

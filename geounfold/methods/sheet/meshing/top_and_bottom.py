@@ -26,7 +26,7 @@ from geounfold.methods.sheet.mid_surface.surface import near_any
 from geounfold.methods.sheet.sharpening.by_lattice_sites import separating_step
 from geounfold.methods.sheet.sharpening.lattice_sites import Sites
 from geounfold.methods.sheet.sharpening.site_places import Places
-from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, SiteRules
+from geounfold.methods.sheet.sharpening.site_rules import DEPTHS, PINCHED, SiteRules
 
 _SMOOTH = 1.5
 """Smoothing length of the heights, in blocks."""
@@ -59,9 +59,6 @@ _BLURRED = 2.0
 
 From one block more on they have full weight.
 """
-
-_THINNEST = 0.25
-"""Half thickness, in blocks, below which lattice sites are not used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +167,7 @@ def separate_horizons(
         sharp[1] + trust * (-hull.bottom - sharp[1]),
     )
     reach = start
-    rules = replace(rules, thinnest=_THINNEST)
+    rules = replace(rules, thinnest=PINCHED)
     places = Places.of(fitted, sites, rules)
     places.follow(fitted.sheet, reach, fitted.slip, steps=1)
     for margin in _MARGINS:

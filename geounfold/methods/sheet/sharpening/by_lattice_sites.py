@@ -87,10 +87,13 @@ class Separation:
         None if no site could be used, or if the steps did not lead towards a separation.
     depth : float
         Mean depth of the used sites on the wrong side, in blocks; infinite if none was used.
+    leaves_out : bool
+        Whether a block lies so far beyond its horizon that it was not used.
     """
 
     sheet: FittedSheet | None
     depth: float
+    leaves_out: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +157,7 @@ def sharpen(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Separation:
     weights = density_weights(used, grid.step)
     slip = slip_potential(sheet, used, weights, grid.energy(2))
     sharper = replace(fitted, sheet=sheet, half=half, slip=slip, smoothing=smooth)
-    return Separation(sharper, last.depth)
+    return Separation(sharper, last.depth, places.leave_out())
 
 
 def enough_sites(fitted: FittedSheet, sites: Sites, rules: SiteRules) -> Sites:

@@ -17,7 +17,6 @@ from geounfold.methods.sheet.sharpening.site_rules import (
     BAND,
     COVER,
     SLACK,
-    TAPER,
     SiteRules,
 )
 
@@ -119,18 +118,22 @@ class Places:
         """Return the sites (indices) that belong to a horizon, not to the rim.
 
         An empty site deep inside the layer lies beyond the rim, and so do the sites around it.  If
-        the layer tapers steeply, horizon and rim cannot be told apart.
+        the layer tapers steeply, horizon and rim can hardly be told apart.
         """
-        beyond, thickness = self.beyond, self.half
+        beyond = self.beyond
         hole = self.holes(depth, rules)
         good = (self.right < clearance(margin)) & (np.abs(beyond) < max(BAND, 4 * margin))
-        good &= (thickness > rules.thinnest) & (self.taper < TAPER)
+        good &= (self.half > rules.thinnest) & (self.taper < rules.taper)
         use = np.flatnonzero(good)
         wide = rules.rim * np.hypot(1.0, rules.sheared * self.slope[use])
         most = float(wide.max(initial=rules.rim))
         rim = cKDTree(self.flat[hole]).query(self.flat[use], distance_upper_bound=most)[0]
         out: Ints = use[rim > wide]
         return out
+
+    def leave_out(self) -> bool:
+        """Return whether a block lies so far beyond its horizon that it is not used."""
+        return bool((self.sites.occupied & (self.beyond > BAND)).any())
 
     def holes(self, depth: float, rules: SiteRules) -> Bools:
         """Return which empty sites lie deep inside the layer, so past its rim, (n,)."""

@@ -21,8 +21,8 @@ Used only if the layer is thin there (`SiteRules.thin`).
 BAND = 1.2
 """Largest distance of a used site from its horizon, in blocks."""
 
-TAPER = 0.25
-"""Slope of the half thickness above which sites are not used: no rim can be told apart there."""
+PINCHED = 0.25
+"""Half thickness, in blocks, below which no site is used: the layer has pinched out there."""
 
 FIRST_SMOOTH = 2.7
 """Smoothing length of the mid surface in the first round, in blocks."""
@@ -44,6 +44,8 @@ class SiteRules:
         and far from any block is a hole, at any depth.
     thinnest : float
         Half thickness below which sites are not used.
+    taper : float
+        Slope of the half thickness above which sites are not used.
     held : bool
         Whether steps are also limited past the rim, over which the sheet is only continued.
     sheared : float
@@ -58,10 +60,15 @@ class SiteRules:
     margins: tuple[float, ...] = (0.3, 0.3, 0.15, 0.1, 0.06, 0.04, 0.03, 0.02, 0.02, 0.02)
     thin: float = 1.25
     thinnest: float = 1.0
+    taper: float = 0.25
     held: bool = True
     sheared: float = 0.0
     smooth: float = FIRST_SMOOTH
     rim: float = RIM
+
+    def to_the_edges(self) -> SiteRules:
+        """Return the rules that use the sites of feather edges and steep flanks too."""
+        return replace(self, thinnest=PINCHED, taper=np.inf)
 
     def for_cells(self, side: float) -> SiteRules:
         """Return the rules for a sheet that was fitted to cells of ``side`` blocks.

@@ -124,6 +124,7 @@ def test_tetrahedra_glued_wrongly_are_found():
     assert not certify(control(V, V, doubled), None, NONE).glued
 
 
+@pytest.mark.slow
 def test_upright_prisms_may_overlap_at_an_inner_hinge():
     """Offsets up to nine tenths of the focal distance, dipping there from one cell to the next.
 

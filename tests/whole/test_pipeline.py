@@ -262,6 +262,7 @@ def test_a_few_torn_blocks_are_left_empty_and_told(swelling, monkeypatch):
     assert any("2 of" in w and "left empty" in w for w in u.summary()["warnings"])
 
 
+@pytest.mark.slow
 def test_blocks_out_of_reach_are_an_error_unless_allowed(swelling, monkeypatch):
     # A control mesh two blocks short of the body's top and bottom, and nothing around it.
     monkeypatch.setattr(build, "PAD", -2.0)

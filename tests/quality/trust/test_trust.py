@@ -88,6 +88,7 @@ def test_repeat_is_poor_at_the_end_of_one_of_its_sheets() -> None:
     assert all(r.blocks > 0 for r in trust.reasons if r.where is not None)
 
 
+@pytest.mark.slow
 def test_branch_is_poor_or_refused() -> None:
     try:
         u = gu.unfold(branched(), parts="one")
@@ -121,6 +122,7 @@ def test_a_ragged_body_is_poor() -> None:
 
 
 # A noisy indicator of a folded layer: levels are 0.073 off the smooth layer's, its hull's 0.06.
+@pytest.mark.slow
 def test_rough_top_and_bottom_are_poor() -> None:
     trust = gu.unfold(FIELD_BODIES["indicator_04"].blocks(0).points).trust
     assert trust is not None

@@ -35,7 +35,12 @@ def horizon_error(body, u, thickness):
     return max(off) * thickness / u.frame.scale
 
 
-@pytest.mark.parametrize("name", SHEETS)
+SLOW = {"one block", "one block, turned", "one block, pierced"}  # 5 to 7 s each
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in SHEETS]
+)
 def test_true_horizons_are_found(name):
     kind, thickness, changes = SHEETS[name]
     body = simulate(kind, blocks=5000, thickness=float(thickness), **changes)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from geounfold.body.working_frame import Frame
+from geounfold.geometry.measures import face_normals
 from geounfold.geometry.mesh import Floats
 from geounfold.mapping.carried import Carried
 from geounfold.mapping.mesh_map import UnfoldingMap
@@ -18,20 +19,34 @@ def level_errors(
 ) -> dict[str, float | None]:
     """Return the mean distance of the hull's top and bottom from their levels, in thicknesses.
 
-    The vertices of faces away from the rim are carried by the map; the stratigraphic coordinate of
-    the top is 1, of the bottom 0. None if no such vertex has an image.
+    The hull is carried by the map; the stratigraphic coordinate of the top is 1, of the bottom 0.
+    The vertices are those of faces away from the rim that look up, or down, in the flat space. The
+    split counts some faces of the flanks to top or bottom, which stand upright there. None if no
+    such vertex has an image.
     """
-    found: dict[str, float | None] = {}
-    for name, side, level in (("top", 1, 1.0), ("bottom", -1, 0.0)):
-        misses = []
-        for fit in fits:
-            faces = fit.split.mesh.F[(fit.split.side == side) & ~fit.split.rim]
-            V = fit.split.mesh.V[np.unique(faces)]
-            misses.append(np.abs(mapping.carry(frame.to_world(V)).stratigraphic - level))
-        miss = np.concatenate(misses)
-        miss = miss[np.isfinite(miss)]
-        found[name] = float(miss.mean()) if len(miss) else None
-    return found
+    misses: dict[str, list[Floats]] = {"top": [], "bottom": []}
+    for fit in fits:
+        split, F = fit.split, fit.split.mesh.F
+        carried = mapping.carry(frame.to_world(split.mesh.V))
+        with np.errstate(invalid="ignore"):  # vertices without an image
+            up = face_normals(carried.points, F)[:, 2]
+        for name, side, level in (("top", 1, 1.0), ("bottom", -1, 0.0)):
+            at = np.unique(F[(split.side == side) & ~split.rim & (up * side > _LOOKS)])
+            misses[name].append(np.abs(carried.stratigraphic[at] - level))
+    return {name: _mean(np.concatenate(parts)) for name, parts in misses.items()}
+
+
+_LOOKS = 0.7
+"""Cosine (45 degrees) from the vertical within which a face of the hull is top or bottom.
+
+Measured on `plunging`, 0.05 blocks from the truth: with the flanks' faces its top is 0.13 of the
+thickness off level at 13,000 blocks, 0.09 at 20,000 and 0.04 at 31,000; without, 0.01 at each.
+"""
+
+
+def _mean(miss: Floats) -> float | None:
+    miss = miss[np.isfinite(miss)]
+    return float(miss.mean()) if len(miss) else None
 
 
 def flat_size(fits: Sequence[BodyFit], carried: Carried, frame: Frame) -> dict[str, float | None]:

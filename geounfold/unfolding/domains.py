@@ -240,15 +240,16 @@ def each_domain(
             continue
         blocks[name] = len(rows)
 
-        def stage(what: str, name: str = name) -> None:
-            if progress is not None:
-                progress(f"{name}: {what}")
-
         try:
-            results[name] = run(rows, stage)
+            results[name] = run(rows, None if progress is None else _of_domain(progress, name))
         except GeounfoldError as error:
             failures[name] = error
     return results, failures, blocks
+
+
+def _of_domain(progress: Progress, name: str) -> Progress:
+    """Return what tells a domain's stages: of one argument, so that it gets no share of the run."""
+    return lambda what: progress(f"{name}: {what}")
 
 
 def check_domains_named(codes: Ints, names: list[str], column: str) -> None:

@@ -98,7 +98,9 @@ def test_if_all_domains_fail_nothing_is_written(folder: Path, capsys) -> None:
 
 def test_the_library_gives_the_same(folder: Path, tmp_path: Path) -> None:
     model = pd.read_csv(folder / "model.csv")
-    found = gu.unfold_domains(model, "domain", where="DOMAIN!=WASTE")
+    told: list[str] = []
+    found = gu.unfold_domains(model, "domain", where="DOMAIN!=WASTE", progress=told.append)
+    assert {name.partition(":")[0] for name in told} == set(LODES)
     flat = pd.read_csv(folder / "flat.csv")
     pd.testing.assert_frame_equal(
         found.table[[*FLAT, "location", "stratigraphic"]],

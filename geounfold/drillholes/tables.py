@@ -17,6 +17,7 @@ from geounfold.io.column_values import objects, unique_names
 from geounfold.io.coordinate_columns import readable_numbers
 from geounfold.io.messages import listing, shown
 from geounfold.io.packages.names import plain_name
+from geounfold.io.paths import SWAPPED
 from geounfold.io.selection import read_where
 from geounfold.io.tables.files import Table, read_table
 from geounfold.io.tables.points import chosen_rows
@@ -194,12 +195,22 @@ def _fields(kind: str, names: list[str], columns: Mapping[str, str], source: str
         elif field not in _OPTIONAL[kind]:
             raise InputError(
                 f"{source}: the {kind} table needs a column for {field} (such as "
-                f"{listing(aliases[:4])}); the file has: {listing(names)}; name it by "
-                f"--holes-columns {field}=NAME"
+                f"{listing(aliases[:4])}); the file has: {listing(names)}; "
+                f"{_cure(kind, field, plain)}"
             )
     if len(set(where.values())) < len(where):
         raise InputError(f"{source}: one column was named for two fields")
     return where
+
+
+def _cure(kind: str, field: str, plain: list[str]) -> str:
+    """Return what to do about a field that is missing: another order of the files, or a name."""
+    for other, fields in ALIASES.items():
+        needed = [f for f in fields if f not in _OPTIONAL[other]]
+        if other != kind and all(set(fields[f]) & set(plain) for f in needed):
+            order = ", ".join(ALIASES)
+            return f"it has those of the {other} table: {SWAPPED} The order is {order}"
+    return f"name it by --holes-columns {field}=NAME"
 
 
 def check_fields(columns: Mapping[str, str], tables: Mapping[str, HoleTable]) -> None:

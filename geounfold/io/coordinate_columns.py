@@ -101,6 +101,11 @@ def coordinate_columns(
         raise _counts_down(source, names[plain.index(down[2])])
     if _all_numbers(names):
         hint = "the first row must name the columns"
+    elif {"from", "to"} <= set(plain):
+        hint = (
+            "intervals of drill-holes have no place of their own: --holes COLLAR SURVEY ASSAY "
+            "places them, and --samples-out writes composites with x, y, z"
+        )
     elif len(names) == 1:
         hint = "columns are separated by commas, semicolons or tabs"
     else:

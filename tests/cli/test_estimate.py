@@ -204,6 +204,7 @@ def test_other_methods(files, tmp_path: Path, method: str) -> None:
         (("--position-error", "1,-2"), "--position-error needs two numbers of 0 or more"),
         (("--position-error", "none.json"), "none.json: no such file"),
         (("--grade", "AU"), "no column 'AU'"),
+        (("--grade", "cu"), "no column 'cu' (did you mean 'CU'?)"),
         (("--grade", "x"), "names a coordinate"),
     ],
 )

@@ -135,6 +135,16 @@ def test_bad_rows_are_named_and_left_out_or_cut(case: str) -> None:
     read_drillholes(*frames(**GOOD), strict=True)
 
 
+@pytest.mark.parametrize(
+    ("order", "found"), [((2, 1, 0), "assay"), ((0, 2, 1), "assay"), ((1, 0, 2), "survey")]
+)
+def test_tables_in_another_order_are_told(order: tuple[int, int, int], found: str) -> None:
+    tables = one_hole()
+    words = rf"it has those of the {found} table: were two files swapped\? The order is collar, s"
+    with pytest.raises(InputError, match=words):
+        read_drillholes(*(tables[k] for k in order))
+
+
 def test_what_was_assumed_in_reading_is_a_sentence(tmp_path: Path) -> None:
     names = []
     for table, name in zip(one_hole(), ("collar", "survey", "assay"), strict=True):

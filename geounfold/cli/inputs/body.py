@@ -16,6 +16,7 @@ from geounfold.cli.inputs.points import open_table, read_samples
 from geounfold.cli.inputs.solid import open_solid, source, table_of
 from geounfold.cli.terminal.console import Console
 from geounfold.io import PointTable, read_surface
+from geounfold.io.packages.names import plain_name
 from geounfold.io.selection.mixed import box_told, mixed_columns
 from geounfold.io.tables.parted import PartedTable
 
@@ -120,6 +121,11 @@ def read_body(args: Namespace, console: Console) -> BodyInputs:
 def _hint(args: Namespace, table: PointTable | PointStream) -> str:
     """Return the sentence on columns of rock that vary; empty if the user chose rows."""
     names = table.names
+    if {"from", "to"} <= {plain_name(name) for name in names}:
+        return (
+            f"{args.points}: has columns from and to, as samples of drill-holes have: POINTS are "
+            "the blocks of the body, and --samples takes the samples"
+        )
     if args.where is not None or args.by is not None or len(set(names)) < len(names):
         return ""
     hint = mixed_columns(names, table.categories)

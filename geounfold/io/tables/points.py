@@ -17,7 +17,7 @@ from geounfold.geometry.mesh import Bools, Floats, Ints
 from geounfold.io.coordinate_columns import coordinate_columns, numbers, without
 from geounfold.io.messages import counted, listing, rows_named, shown
 from geounfold.io.packages.names import Triple
-from geounfold.io.selection import Where, column_position, not_chosen
+from geounfold.io.selection import Where, column_position, nearest_name, not_chosen
 from geounfold.io.selection.labels import codes_of
 from geounfold.io.tables.files import check_writable, read_table, with_columns, write_table
 
@@ -117,8 +117,10 @@ class PointTable:
         where = np.flatnonzero(self.frame.columns == column)
         if len(where) != 1:
             what = "no" if not len(where) else "more than one"
+            near = None if len(where) else nearest_name(column, map(str, self.frame.columns))
+            hint = f" (did you mean '{shown(near)}'?)" if near else ""
             raise InputError(
-                f"{self.source}: {what} column '{shown(column)}'; the file has: "
+                f"{self.source}: {what} column '{shown(column)}'{hint}; the file has: "
                 f"{listing(self.frame.columns)}"
             )
         return self.frame.iloc[:, int(where[0])]

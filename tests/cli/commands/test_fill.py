@@ -73,6 +73,8 @@ def test_fill_takes_two_surfaces(solid):
         ("fill solid.ply --block-size 0.001", "--block-size 0.001 x 0.001 x 0.001 makes about"),
         ("fill solid.ply --sub-blocks 3", "--sub-blocks needs 1, 2, 4 or 8"),
         ("fill none.ply", "none.ply: no such file"),
+        ("unfold i.csv", "; i.csv: has columns from and to, as samples of drill-holes have"),
+        ("unfold a.csv", "intervals of drill-holes have no place of their own: --holes COLLAR"),
         ("fill p.csv", "p.csv: holds points without triangles, which enclose nothing"),
         ("fill solid.ply --where x>3", "(--where is an option of unfold, map, estimate,"),
         ("unfold solid.ply --where x>1", "--where needs block centroids, not surfaces"),
@@ -82,6 +84,9 @@ def test_fill_takes_two_surfaces(solid):
 )
 def test_wrong_input_is_one_line(solid, capsys, words, said):
     pd.DataFrame(np.eye(3), columns=["x", "y", "z"]).to_csv("p.csv", index=False)
+    samples = pd.DataFrame(np.eye(3, 5), columns=["from", "to", "x", "y", "z"])
+    samples.to_csv("i.csv", index=False)
+    samples[["from", "to"]].to_csv("a.csv", index=False)
     assert main([*words.split(), "-o", "out.csv"]) == 2
     line = capsys.readouterr().err
     assert said in line

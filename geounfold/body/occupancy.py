@@ -138,6 +138,13 @@ class Occupancy:
         over_slices(work, len(out), _LAYERS)
         return out, first
 
+    def coarsened(self, side: int) -> Occupancy:
+        """Return the cells of ``side`` blocks a side that are at least half filled."""
+        if side == 1:
+            return self
+        counts, first = self.counts(side)
+        return Occupancy(2 * counts >= side**3, first)
+
     def merged(self, merge: int, steps: Floats, skin: Skin) -> MergedBlocks:
         """Return the blocks merged into cells, as `merged_blocks.merge_blocks` merges them.
 

@@ -34,6 +34,9 @@ Batches = Callable[[], Iterable[Floats]]
 MENDED_BOX = 100_000_000
 """Number of cells of a box up to which a streamed body is mended; a cell takes up to five bytes."""
 
+MOST_FITTED = 16_000_000
+"""Number of blocks above which cells of 2, 3 or more a side take their place in the fit."""
+
 _LAYERED = 3.0  # blocks: thickness from which a body is mended and its sheet parts are sought
 _PARTS = 5.0  # merged cells: layers in which sheet parts are sought, as `parts` has for many cells
 _SEEDS, _BALL = 6, 1000  # places around which blocks are collected, and blocks of each
@@ -53,7 +56,9 @@ class StreamedBody:
     given : Occupancy
         Cells of all blocks, along the axes of the frame.
     own : Occupancy
-        Cells of the body that is fitted: without specks, mended.
+        Cells of the body that is fitted: without specks.
+    frame : Frame
+        Whose cells these are; that of ``prepared`` is coarser if the body is fitted so.
     rows : int
         Number of rows.
     apart : (k, 3) float
@@ -66,6 +71,7 @@ class StreamedBody:
     body: BodyPoints
     given: Occupancy
     own: Occupancy
+    frame: Frame
     rows: int
     apart: Floats
     notes: tuple[str, ...] = ()
@@ -77,8 +83,7 @@ class StreamedBody:
 
     def cells_of(self, points: Floats) -> Ints:
         """Return the lattice cells of points (n, 3) in the data's coordinates."""
-        frame = self.prepared.frame
-        return frame.nearest_cells(frame.to_work(points))
+        return self.frame.nearest_cells(self.frame.to_work(points))
 
 
 def prepare_streamed(batches: Batches, sample: Floats, *, parts: bool) -> StreamedBody:
@@ -195,30 +200,40 @@ def _bodied(
     if frame.steps is None:
         raise ValueError("the frame has no lattice")
     steps, notes = frame.steps, []
-    _, thickness = whole.area_and_thickness(steps)
-    own, record = whole, MendingRecord(np.zeros(0, np.int64), blocks=whole.count)
-    if thickness >= _LAYERED and np.prod(whole.shape + 2 * MARGIN) > MENDED_BOX:
+    side = int(np.ceil((whole.count / MOST_FITTED) ** (1 / 3)))
+    own, frame_of_fit = whole.coarsened(side), _coarser(frame, side)
+    _, thickness = own.area_and_thickness(steps)
+    record = MendingRecord(np.zeros(0, np.int64), blocks=own.count)
+    if thickness >= _LAYERED and np.prod(own.shape + 2 * MARGIN) > MENDED_BOX:
         notes.append(
             f"bridges, handles and cavities were not looked for: the body's box has more than "
             f"{MENDED_BOX:,} cells"
         )
     elif thickness >= _LAYERED:
-        own, record = _mended(whole, frame)
+        own, record = _mended(own, frame_of_fit)
         record.check()
     if parts and thickness >= _LAYERED:
         _check_one_sheet(own, thickness, steps)
     skin = own.skin()
-    near = skin.cells * steps + 0.0
-    surface = near[skin.surface]
-    body = BodyPoints(near, surface, record, hollow=HollowBody(own, skin, steps))
+    outer = skin if side == 1 else whole.skin()
+    surface = frame.middles(outer.cells[outer.surface])
+    work = frame_of_fit.to_work(surface)
+    body = BodyPoints(skin.cells * steps + 0.0, work, record, hollow=HollowBody(own, skin, steps))
     prepared = PreparedPoints(
-        frame.to_world(surface), surface, frame, lattice, (np.arange(len(surface)),), record
+        surface, work, frame_of_fit, lattice, (np.arange(len(surface)),), record
     )
     apart = np.empty((0, 3))
     if whole is not given:
-        others = np.argwhere(given.filled & ~whole.filled) + given.low
-        apart = frame.middles(others)
-    return StreamedBody(prepared, body, given, own, rows, apart, tuple(notes))
+        apart = frame.middles(np.argwhere(given.filled & ~whole.filled) + given.low)
+    return StreamedBody(prepared, body, given, whole, frame, rows, apart, tuple(notes))
+
+
+def _coarser(frame: Frame, side: int) -> Frame:
+    """Return the frame in which ``side`` blocks are one along every axis."""
+    if frame.steps is None or side == 1:
+        return frame
+    corner = frame.to_world((side - 1) / 2 * frame.steps[None])[0]
+    return replace(frame, origin=corner, scale=side * frame.scale)
 
 
 def _mended(whole: Occupancy, frame: Frame) -> tuple[Occupancy, MendingRecord]:

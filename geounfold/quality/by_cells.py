@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geounfold.body.occupancy import Occupancy
+from geounfold.body.working_frame import Frame
 from geounfold.geometry.mesh import Bools, Floats, Ints, Numbers
 from geounfold.mapping.carried import Carried
 from geounfold.mapping.mesh_map import UnfoldingMap
@@ -120,47 +121,49 @@ class _Sums:
         self.plan_square = self.plan_square + own.T @ own
 
 
-def measure_cells(given: Occupancy, mapping: UnfoldingMap, k: int) -> CellFigures:
+def measure_cells(given: Occupancy, frame: Frame, mapping: UnfoldingMap, k: int) -> CellFigures:
     """Return the figures of all occupied cells, carried by a map.
 
     Parameters
     ----------
     given : Occupancy
-        The cells, along the axes of the map's frame.
+        The cells.
+    frame : Frame
+        Along whose axes they are counted.
     mapping : UnfoldingMap
         With the coordinates of tetrahedra.
     k : int
         Number of neighbours.
     """
-    steps = mapping.frame.steps
+    steps = frame.steps
     if steps is None:
-        raise ValueError("the map's frame has no lattice")
+        raise ValueError("the frame has no lattice")
     sums = _Sums(
         RunningStatistics(), np.zeros(len(mapping.whole.folded.T), np.int64), [], [], [], []
     )
     margin = margin_of(steps)
     shape = given.shape + 2 * margin
-    for window, rows in _windows(given, mapping, int(margin[0])):
+    for window, rows in _windows(given, frame, mapping, int(margin[0])):
         cells, carried = window
         placed = np.flatnonzero(carried.placed)
         inner = placed[(placed >= rows.start) & (placed < rows.stop)]
         part = np.searchsorted(placed, [rows.start, rows.stop])
         x, y, z = (cells[placed] - given.low + margin).T
         keys = LatticeWindow((x * shape[1] + y) * shape[2] + z, shape)
-        flat = carried.points[placed] / mapping.frame.scale
+        flat = carried.points[placed] / frame.scale
         change = np.full(rows.stop - rows.start, np.nan)
         if len(inner):
             before, after = keys.mean_distances(steps, flat, k, slice(*part.tolist()))
             change[inner - rows.start] = np.abs(before - after) / before
         suspects = part[0] + np.flatnonzero(change[inner - rows.start] > SUSPECT)
         torn = torn_blocks(cells[placed] * steps, flat, steps, suspects)
-        _add(sums, carried.part(rows), cells[rows], change, mapping)
+        _add(sums, carried.part(rows), cells[rows], change, frame)
         sums.torn.append(cells[placed][torn])
     return _made(sums, given)
 
 
 def _windows(
-    given: Occupancy, mapping: UnfoldingMap, reach: int
+    given: Occupancy, frame: Frame, mapping: UnfoldingMap, reach: int
 ) -> Iterator[tuple[tuple[Ints, Carried], slice]]:
     """Yield the cells and images of a slab with ``reach`` layers around it, and the slab's rows."""
     layers = np.count_nonzero(given.filled, axis=(1, 2))
@@ -173,7 +176,7 @@ def _windows(
         ahead = min(stop + reach, len(layers))
         fresh = np.argwhere(given.filled[done:ahead]) + (given.low + np.array([done, 0, 0]))
         if len(fresh):
-            images.append(mapping.carry(mapping.frame.middles(fresh)))
+            images.append(mapping.carry(frame.middles(fresh)))
             cells = np.concatenate([cells, fresh])
         done = max(done, ahead)
         carried = _joined(images)
@@ -198,7 +201,7 @@ def _joined(parts: list[Carried]) -> Carried:
     )
 
 
-def _add(sums: _Sums, carried: Carried, cells: Ints, change: Floats, mapping: UnfoldingMap) -> None:
+def _add(sums: _Sums, carried: Carried, cells: Ints, change: Floats, frame: Frame) -> None:
     """Add the figures of a slab."""
     sums.error.append(change.astype(np.float32))
     sums.nmd.add(change)
@@ -208,7 +211,7 @@ def _add(sums: _Sums, carried: Carried, cells: Ints, change: Floats, mapping: Un
     out: Bools = out_of_layer(carried.stratigraphic)
     sums.out += int(np.count_nonzero(out))
     some = cells[out][:: max(1, int(np.count_nonzero(out)) // _KEPT)]
-    sums.beyond.append(mapping.frame.middles(some))
+    sums.beyond.append(frame.middles(some))
 
 
 def _made(sums: _Sums, given: Occupancy) -> CellFigures:

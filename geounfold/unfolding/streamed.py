@@ -93,14 +93,14 @@ def unfold_streamed(
         body = prepare_streamed(batches, sample, parts=options.parts == "auto")
     prepared = body.prepared
     found = fit(body.body, prepared.frame, options, None, clock.stage)
-    body = replace(body, body=replace(body.body, hollow=None))  # its cells are not needed any more
     mapping = _map_of(found, body, options)
+    body = replace(body, body=replace(body.body, hollow=None))  # its cells are not needed any more
     with clock.stage("certificate"):
         none = np.empty(0, np.int64)
         certificate = in_data(certify(mapping.control, mapping.shell, none), prepared.frame)
     check_certified(certificate, options)
     with clock.stage("quality"):
-        figures = measure_cells(body.given, mapping, options.neighbours)
+        figures = measure_cells(body.given, body.frame, mapping, options.neighbours)
     certificate = replace(certificate, blocks=figures.held[certificate.elements])
     emptied = _check_cells(body, figures, options)
     with clock.stage("map"):
@@ -130,16 +130,17 @@ def unfold_streamed(
 
 def _map_of(found: BodyFit, body: StreamedBody, options: UnfoldOptions) -> UnfoldingMap:
     """Return the map of a fit."""
-    frame = body.prepared.frame
-    if found.control is None or frame.steps is None:
+    frame, hollow = body.prepared.frame, body.body.hollow
+    if found.control is None or hollow is None:
         raise TypeError("the method has no control mesh")
-    cells = BodyCells.of_table(body.given.filled, body.given.low, frame.steps)
-    return UnfoldingMap(frame, found.control, found.shell, options.reach, body=cells)
+    cells = BodyCells.of_table(hollow.cells.filled, hollow.cells.low, hollow.steps)
+    reach = options.reach * body.frame.scale / frame.scale
+    return UnfoldingMap(frame, found.control, found.shell, reach, body=cells)
 
 
 def _check_cells(body: StreamedBody, figures: CellFigures, options: UnfoldOptions) -> bool:
     """Check that blocks have an image and are not torn; return whether torn ones are left empty."""
-    frame, count = body.prepared.frame, body.given.count
+    frame, count = body.frame, body.given.count
     missed = figures.empty[body.own.holds(figures.empty)]
     check_reached(frame.middles(missed), count, options)
     if 0 < len(figures.torn) <= few(count):

@@ -105,7 +105,7 @@ class StreamedRecord(RunRecord):
     def volumes(self) -> dict[str, float | None]:
         """Volume of the body's blocks in both spaces."""
         count = self.body.given.count - len(self.body.apart)
-        folded = count * self.prepared.frame.scale**3
+        folded = count * self.body.frame.scale**3
         return {"folded": folded, "unfolded": folded * self.ratio}
 
     @property

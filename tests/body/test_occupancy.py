@@ -7,6 +7,7 @@ import pytest
 
 import geounfold as gu
 from geounfold.body import occupancy as module
+from geounfold.body import streamed as streamed_module
 from geounfold.body.lattice import lattice_indices, measure_lattice
 from geounfold.body.merged_blocks import area_and_thickness, merge_blocks, merge_sizes
 from geounfold.body.occupancy import HollowBody, OccupancyBuilder
@@ -114,9 +115,9 @@ def test_specks_and_mended_cells_are_as_in_memory(blocks):
     points = np.concatenate([kept, speck])
     body = streamed(points)
     assert body.prepared.mended.filled == 4
-    assert body.own.count == len(prepare(points, parts=True)[1][0].fitted)
+    assert body.body.hollow.cells.count == len(prepare(points, parts=True)[1][0].fitted)
     np.testing.assert_allclose(body.apart, speck)
-    assert body.own.count == len(kept) + 4
+    assert body.own.count == len(kept)
     assert body.rows == len(points)
 
 
@@ -132,6 +133,26 @@ def test_bodies_that_need_their_rows_are_refused(blocks):
     parents = k[(k % 2 == 0).all(axis=1)]  # every other cell: blocks of twice the side
     with pytest.raises(StreamError, match="several sides"):
         streamed(np.concatenate([k[:4000], parents]))
+
+
+def test_many_blocks_are_fitted_as_cells_of_two_a_side(blocks, monkeypatch):
+    """Cells of eight blocks, at least half filled, in a frame whose unit is theirs."""
+    monkeypatch.setattr(streamed_module, "MOST_FITTED", len(blocks) / 7)
+    body = streamed(blocks)
+    fine, coarse = body.frame, body.prepared.frame
+    assert coarse.scale == 2 * fine.scale
+    low = body.given.low // 2
+    where = np.argwhere(body.given.filled) + body.given.low
+    cells, count = np.unique(where // 2, axis=0, return_counts=True)
+    own = body.body.hollow.cells
+    assert own.holds(cells[count >= 4]).all()
+    assert own.count == (count >= 4).sum()
+    # A cell's middle is that of its eight blocks; coordinates are some 1e6 m.
+    eight = fine.middles(2 * low + np.array(list(np.ndindex(2, 2, 2))))
+    np.testing.assert_allclose(coarse.middles(low[None])[0], eight.mean(axis=0), atol=1e-8)
+    # All blocks at the surface are held by the mesh, in units of the coarse frame.
+    np.testing.assert_allclose(coarse.to_world(body.body.blocks), body.prepared.points, atol=1e-8)
+    assert len(body.body.blocks) == body.own.skin().surface.sum()
 
 
 def test_duplicates_are_counted(blocks):

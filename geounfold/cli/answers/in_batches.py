@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 from geounfold.cli.answers.unfolded import UnfoldedBody
 from geounfold.cli.inputs.body import BodyInputs
+from geounfold.io.selection.mixed import MixedColumns
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from geounfold.geometry.mesh import Floats
     from geounfold.unfolding.result import Unfolding
     from geounfold.unfolding.streamed_result import StreamedUnfolding
@@ -32,6 +35,11 @@ class StreamedAnswer(UnfoldedBody):
     ) -> None:
         super().__init__(cast("Unfolding", result), body, more)
         self._streamed = result
+        self._mixed = MixedColumns(body.table.names)
+
+    def _table_columns(self, frame: pd.DataFrame, points: Floats, rows: slice) -> dict[str, Any]:
+        self._mixed.add(frame)
+        return super()._table_columns(frame, points, rows)
 
     def _results(self, points: Floats, rows: slice) -> dict[str, Any]:
         return self._streamed.carried(points)
@@ -42,5 +50,7 @@ class StreamedAnswer(UnfoldedBody):
         own = dict(self.summary)
         self.summary.clear()
         self.summary.update({**found, **own})
-        self.warnings[:0] = told
+        mixed = self._mixed.sentence()
+        hints = [f"{self._body.table.source}: {mixed}" if mixed else "", self._body.box_hint(found)]
+        self.warnings[:0] = [*filter(None, hints), *told]
         super()._complete()

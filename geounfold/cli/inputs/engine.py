@@ -21,7 +21,15 @@ In memory, four million blocks take 2.4 GiB.
 
 _NEEDS_ROWS = (
     *("report", "where", "by", "faults", "fault_blocks", "limits", "top", "bottom", "grade"),
-    *("block_size", "sub_blocks", "crosscheck", "mended_column", "part_column", "element"),
+    *(
+        "block_size",
+        "sub_blocks",
+        "missing",
+        "crosscheck",
+        "mended_column",
+        "part_column",
+        "element",
+    ),
 )
 """Options that need all rows, or inputs that are not carried batch by batch."""
 

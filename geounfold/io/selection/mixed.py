@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -36,17 +36,47 @@ def mixed_columns(names: Sequence[str], categories: Categories) -> str:
     categories : callable
         Returns a column's values, see `labels.codes_of`.
     """
-    found = []
-    for name in names:
-        if not is_rock(name):
-            continue
-        codes, values = categories(name)
-        counts = {v: int(np.count_nonzero(codes == k)) for k, v in enumerate(values)}
-        blank = int(np.count_nonzero(codes < 0))
-        if blank and counts:
-            counts["blank"] = blank
-        if 2 <= len(counts) <= _MOST:
-            found.append((name, counts))
+    return _told({name: _counts(*categories(name)) for name in names if is_rock(name)})
+
+
+class MixedColumns:
+    """Counts the values of the columns of rock batch by batch.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The table's columns.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._counts: dict[str, dict[str, int]] = {name: {} for name in names if is_rock(name)}
+
+    def add(self, frame: pd.DataFrame) -> None:
+        """Count the values of a batch of rows; a column of too many is left out."""
+        for name, counts in list(self._counts.items()):
+            codes, values = codes_of([frame[name]])
+            for value, count in _counts(codes, values, alone=True).items():
+                counts[value] = counts.get(value, 0) + count
+            if len(counts) > _MOST:
+                del self._counts[name]
+
+    def sentence(self) -> str:
+        """Return the sentence of `mixed_columns` for all batches."""
+        return _told(self._counts)
+
+
+def _counts(codes: Ints, values: list[str], *, alone: bool = False) -> dict[str, int]:
+    """Return how often each value is there; ``alone``: blanks too if there is nothing else."""
+    counts = {v: int(np.count_nonzero(codes == k)) for k, v in enumerate(values)}
+    blank = int(np.count_nonzero(codes < 0))
+    if blank and (counts or alone):
+        counts["blank"] = blank
+    return counts
+
+
+def _told(columns: Mapping[str, dict[str, int]]) -> str:
+    """Return the sentence on columns and the counts of their values; empty if none varies."""
+    found = [(name, counts) for name, counts in columns.items() if 2 <= len(counts) <= _MOST]
     if not found:
         return ""
     told = " and ".join(f"{shown(name)} ({_counted(counts)})" for name, counts in found)

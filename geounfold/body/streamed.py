@@ -37,6 +37,9 @@ MENDED_BOX = 100_000_000
 MOST_FITTED = 16_000_000
 """Number of blocks above which cells of 2, 3 or more a side take their place in the fit."""
 
+HELD = 1_000_000
+"""Number of blocks up to which all are held for the fit, which may then take them one by one."""
+
 _LAYERED = 3.0  # blocks: thickness from which a body is mended and its sheet parts are sought
 _PARTS = 5.0  # merged cells: layers in which sheet parts are sought, as `parts` has for many cells
 _SEEDS, _BALL = 6, 1000  # places around which blocks are collected, and blocks of each
@@ -57,8 +60,11 @@ class StreamedBody:
         Cells of all blocks, along the axes of the frame.
     own : Occupancy
         Cells of the body that is fitted: without specks.
+    fitted : Occupancy
+        Cells that the fit takes: mended, and coarser if there are many; along the axes of the
+        frame of ``prepared``.
     frame : Frame
-        Whose cells these are; that of ``prepared`` is coarser if the body is fitted so.
+        Whose cells the first two are; that of ``prepared`` is coarser if the body is fitted so.
     rows : int
         Number of rows.
     apart : (k, 3) float
@@ -71,6 +77,7 @@ class StreamedBody:
     body: BodyPoints
     given: Occupancy
     own: Occupancy
+    fitted: Occupancy
     frame: Frame
     rows: int
     apart: Floats
@@ -214,18 +221,28 @@ def _bodied(
         record.check()
     if parts and thickness >= _LAYERED:
         _check_one_sheet(own, thickness, steps)
-    skin = own.skin()
-    outer = skin if side == 1 else whole.skin()
+    outer = whole.skin()
     surface = frame.middles(outer.cells[outer.surface])
     work = frame_of_fit.to_work(surface)
-    body = BodyPoints(skin.cells * steps + 0.0, work, record, hollow=HollowBody(own, skin, steps))
+    if own.count <= HELD:
+        cells = np.argwhere(own.filled) + own.low
+        body = BodyPoints(cells * steps + 0.0, frame_of_fit.to_work(_blocks(whole, frame)), record)
+    else:
+        skin = outer if own is whole else own.skin()
+        hollow = HollowBody(own, skin, steps)
+        body = BodyPoints(skin.cells * steps + 0.0, work, record, hollow=hollow)
     prepared = PreparedPoints(
         surface, work, frame_of_fit, lattice, (np.arange(len(surface)),), record
     )
     apart = np.empty((0, 3))
     if whole is not given:
         apart = frame.middles(np.argwhere(given.filled & ~whole.filled) + given.low)
-    return StreamedBody(prepared, body, given, whole, frame, rows, apart, tuple(notes))
+    return StreamedBody(prepared, body, given, whole, own, frame, rows, apart, tuple(notes))
+
+
+def _blocks(cells: Occupancy, frame: Frame) -> Floats:
+    """Return the middles of occupied cells in the data's coordinates."""
+    return frame.middles(np.argwhere(cells.filled) + cells.low)
 
 
 def _coarser(frame: Frame, side: int) -> Frame:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from geounfold.backends.blas import one_thread
+from geounfold.body.prepare import BodyPoints
 from geounfold.body.streamed import Batches, StreamedBody, prepare_streamed
 from geounfold.errors import StreamError
 from geounfold.geometry.mesh import Floats
@@ -94,7 +95,7 @@ def unfold_streamed(
     prepared = body.prepared
     found = fit(body.body, prepared.frame, options, None, clock.stage)
     mapping = _map_of(found, body, options)
-    body = replace(body, body=replace(body.body, hollow=None))  # its cells are not needed any more
+    body = replace(body, body=BodyPoints(prepared.work, prepared.work), fitted=body.given)  # spare
     with clock.stage("certificate"):
         none = np.empty(0, np.int64)
         certificate = in_data(certify(mapping.control, mapping.shell, none), prepared.frame)
@@ -130,10 +131,10 @@ def unfold_streamed(
 
 def _map_of(found: BodyFit, body: StreamedBody, options: UnfoldOptions) -> UnfoldingMap:
     """Return the map of a fit."""
-    frame, hollow = body.prepared.frame, body.body.hollow
-    if found.control is None or hollow is None:
+    frame = body.prepared.frame
+    if found.control is None or frame.steps is None:
         raise TypeError("the method has no control mesh")
-    cells = BodyCells.of_table(hollow.cells.filled, hollow.cells.low, hollow.steps)
+    cells = BodyCells.of_table(body.fitted.filled, body.fitted.low, frame.steps)
     reach = options.reach * body.frame.scale / frame.scale
     return UnfoldingMap(frame, found.control, found.shell, reach, body=cells)
 

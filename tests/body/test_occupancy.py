@@ -25,6 +25,12 @@ def blocks():
     return np.random.default_rng(3).permutation(folded)
 
 
+@pytest.fixture(autouse=True)
+def _hollow(monkeypatch):
+    """Bodies of few blocks are hollow too."""
+    monkeypatch.setattr(streamed_module, "HELD", 0)
+
+
 def built(cells, size=1000):
     """The occupancy of cells that come in batches."""
     builder = OccupancyBuilder()

@@ -125,6 +125,7 @@ def test_a_row_without_a_place_is_told_or_left_out(here, capsys):
 def test_the_answer_is_that_of_the_run_in_memory(here, capsys, monkeypatch):
     """Files in any order of rows, a folder, samples, sides: to 1e-9 of what memory gives."""
     monkeypatch.setattr(merged_blocks, "LEAST_SURFACE", 1000.0)
+    monkeypatch.setattr(streamed_body, "HELD", 0)
     Path("c.toml").write_text(SOON)
     rock = np.where(np.arange(len(table())) % 3, "ore", "")
     frame = table(dx=9.0, dy=9.0, dz=9.0, rock=rock).sample(
@@ -168,9 +169,30 @@ def test_the_answer_is_that_of_the_run_in_memory(here, capsys, monkeypatch):
         np.testing.assert_array_equal(carried.points[:, 2], found["unfolded_z"])
 
 
+def test_a_damaged_file_is_told(here, capsys):
+    table().to_parquet("b.parquet", index=False)
+    content = bytearray(Path("b.parquet").read_bytes())
+    content[1000:3000] = bytes(2000)
+    Path("b.parquet").write_bytes(content)
+    assert main(["unfold", "b.parquet", "-o", "o.parquet", "--engine", "batches"]) == 2
+    assert "b.parquet: is no Parquet file, or a damaged one" in said(capsys)
+    assert not Path("o.parquet").exists()
+
+
+@pytest.mark.slow
+def test_few_blocks_are_fitted_one_by_one(here):
+    frame = table()
+    frame.to_parquet("b.parquet", index=False)
+    assert main(["unfold", "b.parquet", "-o", "o.parquet", "--engine", "batches"]) == 0
+    assert main(["unfold", "b.parquet", "-o", "m.parquet"]) == 0
+    found, expected = pd.read_parquet("o.parquet"), pd.read_parquet("m.parquet")
+    pd.testing.assert_frame_equal(found, expected, rtol=1e-7, atol=1e-7)  # single precision
+
+
 @pytest.mark.slow
 def test_more_blocks_are_fitted_as_cells_of_two_a_side(here, monkeypatch):
     """Every row is carried and proved, and lies within half a block of the truth."""
+    monkeypatch.setattr(streamed_body, "HELD", 0)
     monkeypatch.setattr(streamed_body, "MOST_FITTED", 400_000)
     body = gu.simulate("large", steps=(7.5, 7.5, 7.5))
     body.frame().to_parquet("b.parquet", index=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,7 +48,7 @@ class ParquetFolder:
         other = next((file for file in paths if ending(file) != ".parquet"), None)
         if other is not None:
             raise InputError(f"{other}: is no Parquet file, which is read in batches")
-        self.first, self.files = paths[0], len(paths)
+        self.first, self.files, self._paths = paths[0], len(paths), paths
         self._files = [_opened(file) for file in paths]
         self.names = self._files[0].names
         for file, source in zip(paths, self._files, strict=True):
@@ -61,8 +62,9 @@ class ParquetFolder:
 
     def batches(self, columns: tuple[int, ...] | None = None) -> Iterator[pd.DataFrame]:
         """Yield the rows in batches, of all columns or of some, by position."""
-        for source in self._files:
-            yield from source.batches(columns)
+        for path, source in zip(self._paths, self._files, strict=True):
+            with _readable(path):
+                yield from source.batches(columns)
 
     def sample(self, columns: tuple[int, ...]) -> Iterator[pd.DataFrame]:
         """Yield runs of rows from places spread over the files."""
@@ -70,13 +72,23 @@ class ParquetFolder:
         for row in np.unique(np.linspace(0, self.rows - 1, _PLACES).astype(np.int64)).tolist():
             file = int(np.searchsorted(ends, row, side="right"))
             source = self._files[file]
-            yield source.run(row - int(ends[file]) + source.rows, _RUN, columns)
+            with _readable(self._paths[file]):
+                yield source.run(row - int(ends[file]) + source.rows, _RUN, columns)
 
 
 def _opened(path: Path) -> ParquetSource:
     existing_file(path)
-    try:
+    with _readable(path):
         return ParquetSource(path)
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Give Arrow's errors on damaged files the file's name."""
+    try:
+        yield
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is no Parquet file, or a damaged one: {error}") from error
 
@@ -134,7 +146,7 @@ class StreamedPoints:
             A coordinate is no number, missing or too large, or the file cannot be read.
         """
         row, dropped = 0, []
-        for frame in self._frames():
+        for frame in self._rows.batches(self._axes):
             points = self._points(frame)
             valid = np.isfinite(points).all(axis=1)
             if not valid.all():
@@ -169,14 +181,6 @@ class StreamedPoints:
         )
         found.__dict__["duplicates"] = duplicates  # a cached property, which needs all points
         return found
-
-    def _frames(self) -> Iterator[pd.DataFrame]:
-        try:
-            yield from self._rows.batches(self._axes)
-        except (OSError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{self.source}: cannot be read: {error}") from error
 
     def _points(self, frame: pd.DataFrame) -> Floats:
         columns = [numbers(frame.iloc[:, k], source=self.source) for k in range(3)]

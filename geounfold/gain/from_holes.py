@@ -134,7 +134,7 @@ def study_holes(
 def check_enough_holes(grade: str, count: int, which: str) -> None:
     """Raise InputError if so many holes are too few for a comparison that leaves out each in turn.
 
-    ``which`` says what holes were counted.
+    ``which`` names the holes that were counted.
     """
     if count < _FEWEST_HOLES:
         raise InputError(

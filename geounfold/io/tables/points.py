@@ -217,7 +217,7 @@ def read_points(  # 9 parameters: the choices of columns, rows and element, and 
     element : str, optional
         Name of the element to read, for a file of several.
     missing : tuple of float, optional
-        Values that mean a missing coordinate, where they lie far from all others (see `coded`).
+        Values that mean a missing coordinate if they lie far from all others (see `coded`).
 
     Raises
     ------

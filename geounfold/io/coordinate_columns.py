@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -196,6 +196,8 @@ def numbers(column: pd.Series, *, source: str = "the table") -> Floats:
 _NINES = np.array([v for k in range(2, 8) for v in (10**k - 1.0, 10**k - 0.01)])
 """Codes of missing values that programs write: 99, 99.99, 999 ..., of either sign."""
 
+_NINES_SET = frozenset(_NINES.tolist())
+
 _ALONE = 0.1
 """Share of the other values' extent that a code is off the nearest of them, else it is a place."""
 
@@ -203,13 +205,18 @@ _ALONE = 0.1
 def coded(values: Floats, codes: Floats | None = None) -> Bools:
     """Return which coordinates along one axis are codes of missing values, (n,).
 
-    A code is a value of ``codes``, by default nines of either sign, that lies far from all others.
+    A code is a value of ``codes`` that lies far from all others. By default codes are nines of
+    either sign, if one of them is the smallest or the largest value.
 
     Examples
     --------
-    >>> coded(np.array([0.0, 500, -999, 1000])).tolist(), coded(np.array([-999.0, -1000])).tolist()
-    ([False, False, True, False], [False, False])
+    >>> coded(np.array([0.0, 500, -999, 1000])).tolist()
+    [False, False, True, False]
+    >>> coded(np.array([-999.0, -980, -600])).tolist()  # the level below is near
+    [False, False, False]
     """
+    if codes is None and not _NINES_SET & {abs(float(end)) for end in _ends(values)}:
+        return np.zeros(len(values), dtype=bool)
     known = np.abs(values) if codes is None else values
     found: Bools = np.isin(known, _NINES if codes is None else codes)
     rest = values[~found & np.isfinite(values)]
@@ -228,7 +235,14 @@ def without(values: Floats, missing: tuple[float, ...]) -> Floats:
     return np.where(coded(values, np.array(missing)), np.nan, values)
 
 
-def coded_told(points: Floats, columns: Sequence[str], rows: Ints) -> str:
+def _ends(values: Floats) -> tuple[float, float]:
+    """Return the smallest and the largest value, of those that are numbers."""
+    if not len(values):
+        return 0.0, 0.0
+    return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+
+
+def coded_told(points: Floats, columns: Sequence[str], rows: Callable[[], Ints]) -> str:
     """Return the sentence on coordinates that are codes of missing values; empty without any.
 
     Parameters
@@ -237,13 +251,14 @@ def coded_told(points: Floats, columns: Sequence[str], rows: Ints) -> str:
         Coordinates.
     columns : sequence of str
         Their names.
-    rows : (n,) int
-        Data row of each in the file, from 1.
+    rows : callable
+        Returns the data row of each in the file, from 1; called if there are such coordinates.
     """
     there = [(name, values, coded(values)) for name, values in zip(columns, points.T, strict=True)]
-    told = [(name, values[mask], rows[mask]) for name, values, mask in there if mask.any()]
-    if not told:
+    if not any(mask.any() for _, _, mask in there):
         return ""
+    row = rows()
+    told = [(name, values[mask], row[mask]) for name, values, mask in there if mask.any()]
     every = np.unique(np.concatenate([at for _, _, at in told]))
     code = f"{told[0][1][0]:g}"
     verb = "has" if len(every) == 1 else "have"

@@ -22,6 +22,7 @@ from geounfold.io.tables.points import Place
 
 if TYPE_CHECKING:
     from geounfold.body.model_frame import ModelFrame
+    from geounfold.geometry.mesh import Ints
     from geounfold.io.tables.large import PointStream
 
 TRUE: Triple = ("true_x", "true_y", "true_z")
@@ -188,9 +189,13 @@ def _tell(table: PointTable | PointStream, path: str, console: Console) -> None:
         count, named = counted(len(table.dropped), "row"), rows_named(table.dropped.tolist())
         console.warn(f"{path}: {count} without finite coordinates left out: {named}")
     if isinstance(table, PointTable) or table.kept is not None:
-        every = np.arange(1, len(table) + len(table.dropped) + 1)
-        kept = np.setdiff1d(every, table.dropped, assume_unique=True)
         chosen = slice(None) if table.chosen is None else table.chosen
-        told = coded_told(table.points[chosen], table.columns, kept[chosen])
+        told = coded_told(table.points[chosen], table.columns, lambda: _rows_of(table)[chosen])
         if told:
             console.warn(f"{path}: {told}")
+
+
+def _rows_of(table: PointTable | PointStream) -> Ints:
+    """Return the data row in the file of every point, from 1."""
+    every = np.arange(1, len(table) + len(table.dropped) + 1)
+    return np.setdiff1d(every, table.dropped, assume_unique=True)

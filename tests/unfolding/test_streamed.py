@@ -87,6 +87,7 @@ WRONG = (
     (["b.parquet", "--engine", "batches", "--where", "x>0"], ("go without --where",)),
     (["b.parquet", "--engine", "batches", "--method", "ufo"], ("method ufo",)),
     (["b.parquet", "--engine", "batches", "-o", "o.vtp"], ("OUT must end in", "o.vtp")),
+    (["folder", "-o", "folder/a.parquet", "--overwrite"], ("--output is also an input",)),
     (["mixed"], ("other columns than",)),
     (["texts"], ("a.csv: is no Parquet file",)),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geounfold.cli.answers.closing import closing_lines, names_of
@@ -92,7 +93,7 @@ def run(args: Namespace, console: Console) -> None:
 def _outputs(args: Namespace, console: Console) -> Outputs:
     """Return the checked outputs."""
     inputs = files_given(
-        *(args.points, args.samples, args.top, args.bottom, config_file(args)),
+        *(*_points_files(args), args.samples, args.top, args.bottom, config_file(args)),
         *(*(args.holes or ()), *(args.faults or ())),
         *(limit for limit in args.limits or () if limit.count(",") != 5),
     )
@@ -107,6 +108,13 @@ def _outputs(args: Namespace, console: Console) -> Outputs:
         "--traces-out": (args.traces_out, TRACES),
     }
     return Outputs.planned(wanted, inputs, overwrite=args.overwrite, watcher=console.journal)
+
+
+def _points_files(args: Namespace) -> list[str | None]:
+    """Return the file of the points, or all files of their folder."""
+    if args.points is None or not Path(args.points).is_dir():
+        return [args.points]
+    return [str(file) for file in sorted(Path(args.points).iterdir()) if file.is_file()]
 
 
 def _check_mesh_outputs(args: Namespace, options: UnfoldOptions) -> None:

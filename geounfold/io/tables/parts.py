@@ -101,7 +101,9 @@ def files_in(folder: Path) -> list[Path]:
     endings = {ending(f) for f in files}
     if len(endings) != 1 or not endings <= {".csv", ".parquet"}:
         held = ", ".join(sorted(endings)) or "nothing"
-        raise InputError(f"{folder}: a folder of parts must hold .parquet or .csv, not {held}")
+        raise InputError(
+            f"{folder}: is a directory; one of parts must hold .parquet or .csv, not {held}"
+        )
     return files
 
 

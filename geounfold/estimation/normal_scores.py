@@ -59,6 +59,9 @@ def hermite_shares(values: Floats) -> Floats:
 def shape_of_grades(shape: Shape, shares: Floats) -> Shape:
     """Return the model of the grades that belongs to a model of their normal scores.
 
+    The nugget is exact: what the grades' correlation lacks to 1 at short distances. Ranges, and
+    the sills of several structures, are fitted to it by least squares.
+
     Parameters
     ----------
     shape : Shape
@@ -69,25 +72,28 @@ def shape_of_grades(shape: Shape, shares: Floats) -> Shape:
     used = np.flatnonzero(shape.shares[1:] > 1e-3)
     if not len(used):
         return shape
+    terms = np.concatenate([[0.0], shares])
+    nugget = max(0.0, 1 - float(np.polynomial.polynomial.polyval(1 - shape.shares[0], terms)))
     lags = np.concatenate(
         [r * _LAGS[:, None] * np.eye(3)[a] for r in shape.ranges[used] for a in range(3)]
     )
     rho = _correlation(shape.kinds, shape.shares, shape.ranges, lags)
-    wanted: Floats = np.polynomial.polynomial.polyval(rho, np.concatenate([[0.0], shares]))
+    wanted: Floats = np.polynomial.polynomial.polyval(rho, terms)
     # The nearest lags have most weight in kriging.
     weight = 1 / (0.1 + np.tile(_LAGS, 3 * len(used)))
-    count = len(shape.kinds)
+    others = len(shape.kinds) - 1
 
     def model(x: Floats) -> tuple[Floats, Floats]:
-        raised = np.exp(np.concatenate([[0.0], x[:count]]))
-        return raised / raised.sum(), shape.ranges * np.exp(x[count:])[:, None]
+        raised = np.exp(np.concatenate([[0.0], x[:others]]))
+        sills = (1 - nugget) * raised / raised.sum()
+        return np.concatenate([[nugget], sills]), shape.ranges * np.exp(x[others:])[:, None]
 
     def misfit(x: Floats) -> Floats:
         return np.asarray(weight * (_correlation(shape.kinds, *model(x), lags) - wanted))
 
-    start = np.log(np.maximum(shape.shares, 1e-3))
-    start = np.concatenate([start[1:] - start[0], np.zeros(count)])
-    limit = np.concatenate([np.full(count, 12.0), np.full(count, np.log(4.0))])
+    start = np.log(np.maximum(shape.shares[1:], 1e-3))
+    start = np.concatenate([start[1:] - start[0], np.zeros(others + 1)])
+    limit = np.concatenate([np.full(others, 12.0), np.full(others + 1, np.log(4.0))])
     found = least_squares(misfit, np.clip(start, -limit, limit), bounds=(-limit - 1, limit + 1))
     new_shares, ranges = model(found.x)
     return Shape(

@@ -190,6 +190,20 @@ def test_a_bent_layer_is_preferred_to_its_larger_plane_flanks() -> None:
     assert found[1].measure > found[0].measure
 
 
+def test_swells_parted_by_steep_slopes_are_one_sheet() -> None:
+    # Pinch and swell, 3 to 12 blocks thick within ten: no two faces on the slopes look straight at
+    # each other.  0.51 of top and bottom counted as flanks; now none, and 0.7 of the flanks.
+    columns, rows, layers = box(60, 36, 14).T
+    thick = 3 + 9 * (0.5 + 0.5 * np.sin(np.pi * columns / 10))
+    points = np.stack([columns, rows, layers], axis=1)[np.abs(layers) < thick / 2]
+    result = split(hull_of(points))
+    normal = face_normals(result.mesh.V, result.mesh.F)
+    area = triangle_areas(result.mesh.V, result.mesh.F)
+    sides, flanks = np.abs(normal[:, 2]) > 0.5, np.abs(normal[:, 1]) > 0.9
+    assert not result.beyond[sides].any()
+    assert np.average(result.beyond[flanks], weights=area[flanks]) > 0.6
+
+
 def test_a_hull_without_a_pair_of_sides_is_its_own_candidate(
     slab: TriMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,7 +25,7 @@ from geounfold.surfaces.split.faces import (
     unmet_faces,
 )
 from geounfold.surfaces.split.is_sheet import check_sheet
-from geounfold.surfaces.split.pairs import continued_sides, sheet_pair, signs
+from geounfold.surfaces.split.pairs import continued_sides, flanks, sheet_pair, signs
 from geounfold.surfaces.split.result import SurfaceSplit
 from geounfold.surfaces.split.signed_graph import signed_laplacian
 
@@ -116,8 +116,9 @@ def split_signed(
     faces = measure_faces(mesh)
     L = signed_laplacian(faces)
     pair, candidates = sheet_pair(faces, L, walls)
-    faces = replace(faces, median=pair.thickness, other=pair.others)
-    result = _result(mesh, faces, signs(continued_sides(L, pair)), up)
+    side = signs(continued_sides(L, pair))
+    faces = replace(faces, median=pair.thickness, other=flanks(faces, pair, side))
+    result = _result(mesh, faces, side, up)
     return replace(result, candidates=candidates)
 
 

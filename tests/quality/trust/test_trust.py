@@ -60,7 +60,7 @@ def swelling() -> tuple[Floats, Floats]:
     """Return a layer whose thickness grows fivefold within ten blocks, and its levels."""
     P = _grid((-28, -18, -8), (28, 18, 8))
     x, _, z = P.T
-    half = 1.25 * (1 + 2 * (1 + np.tanh((np.abs(x) - 14) / 4)))
+    half = 1.25 * (1 + 2 * (1 + np.tanh((np.abs(x) - 10) / 4)))
     inside = np.abs(z) < half
     return P[inside], ((z + half) / (2 * half))[inside]
 
@@ -75,7 +75,7 @@ def test_fault_is_poor_with_every_datum(datum: str) -> None:
     trust = gu.unfold(faulted(0.8 * THICKNESS), datum=datum, parts="one").trust
     assert trust is not None
     assert trust.word == "poor"
-    assert "level" in {c.name for c in CRITERIA for r in trust.reasons if r.do == c.do}
+    assert "step" in {c.name for c in CRITERIA for r in trust.reasons if r.do == c.do}
 
 
 def test_repeat_is_poor_at_the_end_of_one_of_its_sheets() -> None:

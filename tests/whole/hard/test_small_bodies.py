@@ -19,7 +19,8 @@ def unfold_without_closer_fit(folded: np.ndarray) -> gu.Unfolding:
 def off(u: gu.Unfolding, body: Body) -> float:
     """Return the RMS distance from the truth, in sides of a cube of a block's volume."""
     side = float(np.cbrt(body.sizes.prod(axis=1).mean()))
-    return float(gu.aligned_rms(u.points, body.truth)) / side
+    placed = np.isfinite(u.points).all(axis=1)
+    return float(gu.aligned_rms(u.points[placed], body.truth[placed])) / side
 
 
 # RMS in blocks, measured: 1.96 and 0.26; 0.84 and 0.24.
@@ -37,6 +38,7 @@ def test_a_sheet_that_lost_a_limb_is_fitted_more_closely(
     body = random_body(seed, family)
     once, again = unfold_without_closer_fit(body.folded), gu.unfold(body.folded)
     assert again.injective
+    assert np.isfinite(again.points).all()
     assert off(again, body) < 0.4
     assert off(again, body) < 0.5 * off(once, body)
     before, after = (u.fits[0].sheet.fitted for u in (once, again))

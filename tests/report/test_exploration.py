@@ -165,7 +165,7 @@ def test_too_few_in_reach_is_one_clear_error(carried) -> None:
         ("holes", ("--grade", "AU", "--report", "r.html"), "only 5 of"),
         ("samples", ("--grade", "ZN", "--report", "r.html"), "samples.csv: no column 'ZN'"),
         ("samples", ("--grade", "x", "--report", "r.html"), "names a coordinate"),
-        ("samples", ("--grade", "ROCK", "--report", "r.html"), "no numbers"),
+        ("samples", ("--grade", "ROCK", "--report", "r.html"), "holds words, such as ore"),
     ],
 )
 def test_what_cannot_be_is_one_line(

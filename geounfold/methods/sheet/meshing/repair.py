@@ -14,6 +14,7 @@ import numpy as np
 
 from geounfold.backends.igl import TetIndex
 from geounfold.backends.progress import told
+from geounfold.geometry.measures import tet_volumes
 from geounfold.geometry.mesh import Floats, Ints
 from geounfold.geometry.untangle import untangle
 from geounfold.mapping.certificate import Gluing, SpaceFlaws, examine
@@ -244,6 +245,8 @@ def _untangled(columns: Columns, layers: Layers, exam: _Exam) -> tuple[Laid | No
     if len(bad) > _MOVABLE * laid.inner:
         return None, exam.rung("untangled")
     folded = untangle(laid.folded, laid.T, laid.unfolded, bad)
+    if (tet_volumes(folded, laid.T) <= 0).any():
+        return None, exam.rung("untangled", len(bad))
     unfolded = untangle(laid.unfolded, laid.T, folded, bad)
     proved, exam = _proved(columns, layers, (folded, unfolded))
     return proved, exam.rung("untangled", len(bad))

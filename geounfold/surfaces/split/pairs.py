@@ -62,11 +62,11 @@ Measured: at half, two strips narrower than thick are split by their flanks; twi
 """
 
 SAME_LAYER = 0.5
-"""Cosine of smoothed normals, the median over a pair's faces, from which it continues the sheet.
+"""Cosine of smoothed normals, of more than half of a pair's faces, at which it continues the sheet.
 
-It is taken between a face and the nearest one of the sheet on the same side.  Measured: bulges,
-boudins, steps and far sides of faults 0.78 to 1, flanks and ends -0.26 to 0.2, limbs past the
-crease of an isoclinal fold -0.7.
+It is taken between a face and the nearest one of the sheet on the same side, without its sign: the
+limbs past the crease of an isoclinal fold look at each other.  Measured: bulges, boudins, steps and
+far sides of faults 0.78 to 1, such limbs -0.7, flanks and ends -0.26 to 0.2.
 """
 
 
@@ -202,7 +202,7 @@ def flanks(faces: Faces, pair: Pair, side: Ints) -> Bools:
     """Return the faces that are no part of the sheet, (m,): flanks, ends, and what ridges part.
 
     A sheet of uneven thickness has several pairs of opposite sides: steep slopes part them, along
-    which no two faces look straight at each other.  Those that look the way of the nearest faces
+    which no two faces look straight at each other.  Those that are parallel to the nearest faces
     of the same side belong to one sheet.
 
     Parameters
@@ -217,11 +217,11 @@ def flanks(faces: Faces, pair: Pair, side: Ints) -> Bools:
     rank, own = pair.rank, np.zeros(len(side), dtype=bool)
     own[pair.rows] = True
     while True:
-        looks = _same_way(faces, own, side)
+        parallel = _parallel(faces, own, side)
         far = (rank >= 0) & ~own
         at = np.unique(rank[far], return_inverse=True)[1]
         area = faces.area[far]
-        agrees = np.bincount(at, area * (looks[far] > SAME_LAYER)) > 0.5 * np.bincount(at, area)
+        agrees = np.bincount(at, area * (parallel[far] > SAME_LAYER)) > 0.5 * np.bincount(at, area)
         if not agrees.any():
             break
         own[far] = agrees[at]
@@ -229,13 +229,13 @@ def flanks(faces: Faces, pair: Pair, side: Ints) -> Bools:
     return out
 
 
-def _same_way(faces: Faces, own: Bools, side: Ints) -> Floats:
-    """Return the cosine between each face's normal and the nearest own face's on its side, (m,)."""
-    looks = np.full(len(side), -1.0)
+def _parallel(faces: Faces, own: Bools, side: Ints) -> Floats:
+    """Return how parallel each face is to the nearest own one on its side, (m,): |cosine|, or 0."""
+    cosine = np.zeros(len(side))
     for s in (1, -1):
         sheet = np.flatnonzero(own & (side == s))
         mine = (side == s) & ~own
         if len(sheet) and mine.any():
             near = sheet[cKDTree(faces.centre[sheet]).query(faces.centre[mine])[1]]
-            looks[mine] = np.einsum("ij,ij->i", faces.smoothed[mine], faces.smoothed[near])
-    return looks
+            cosine[mine] = np.einsum("ij,ij->i", faces.smoothed[mine], faces.smoothed[near])
+    return np.abs(cosine)

@@ -4,7 +4,8 @@ A body has several pairs of opposite sides: top and bottom, flanks, ends.  The c
 its largest pairs by area, `CANDIDATES`; if no face has an opposite one that looks straight back,
 the only candidate is the whole hull.  The measure of a candidate is its extent, the area of its
 smaller side over the squared thickness, divided by `BENT_ADVANTAGE` if both sides are plane.  The
-candidate of the largest measure is taken, the larger pair if two are equal.
+candidate of the largest measure is taken, of those whose sides are `CLOSEST` apart or more; the
+larger pair if two are equal.
 """
 
 from __future__ import annotations
@@ -36,6 +37,13 @@ Of 106 hulls, half the angle moves sides by 1 % of the area or more on 16, twice
 
 CANDIDATES = ("largest pair", "second pair", "third pair")
 """Names of the candidates, by area: top and bottom, flanks and ends in any order."""
+
+CLOSEST = 0.5
+"""Distance of two sides, in blocks, below which they are a crumple of the hull, not a body's.
+
+Measured: one 0.04 blocks thick, 0.15 % of a branch's hull, had the largest extent; sheets of one
+block have sides 2 blocks apart.
+"""
 
 SPECK = 30
 """Number of faces up to which what a ridge surrounds is a roughness, not another side.
@@ -101,7 +109,7 @@ def sheet_pair(
     count = int(rank.max()) + 1
     pairs = [_pair(name, rank, k, faces, L) for k, name in enumerate(CANDIDATES[:count])]
     pairs = pairs or [_whole(faces, L)]
-    taken = max(pairs, key=lambda pair: pair.candidate.measure)
+    taken = max(pairs, key=lambda pair: (pair.thickness >= CLOSEST, pair.candidate.measure))
     return taken, tuple(replace(p.candidate, taken=p is taken) for p in pairs)
 
 

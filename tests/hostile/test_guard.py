@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from geounfold.backends.system import files
@@ -150,12 +151,14 @@ def test_a_library_that_prints_more_than_a_pipe_holds(
         ("unfold", "p.csv", "-o", "new.csv", "--summary", "s2.json", "--map", "m2.npz"),
         ("map", "given.npz", "p.csv", "-o", "new.csv"),
         ("compare", "p.csv", "-o", "new.csv", "--flatteners", "lscm"),
-        ("quality", "p.csv", "p.csv"),
+        ("quality", "p.csv", "higher.csv"),
         ("init", "-o", "new.toml"),
     ],
     ids=lambda argv: argv[0],
 )
 def test_main_commands(argv: tuple[str, ...], folder: Path) -> None:
+    points = pd.read_csv(folder / "p.csv")
+    (points + 1).to_csv(folder / "higher.csv", index=False)
     before = {*state_of(folder)}
     done = subprocess.run(
         [sys.executable, "-m", "geounfold", *argv],

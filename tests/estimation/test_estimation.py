@@ -35,7 +35,7 @@ from geounfold.estimation.neighbourhood import Search
 from geounfold.estimation.scores import conservation
 from geounfold.estimation.worker import apart
 from geounfold.report.plots.grades import charts
-from geounfold.synthetic import FIELD_KINDS, GradeField, drill
+from geounfold.synthetic import GradeField, drill
 
 pytest.importorskip("gstlearn", reason="the extra geostat is not installed")
 
@@ -212,7 +212,14 @@ def test_gamma_is_nothing_at_nothing_and_the_sill_far_away() -> None:
     assert east[0] == pytest.approx(0.95 * 0.7, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", FIELD_KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "spherical",
+        pytest.param("exponential", marks=pytest.mark.slow),
+        pytest.param("gaussian", marks=pytest.mark.slow),
+    ],
+)
 def test_the_fit_finds_the_ranges_of_a_field(kind: str) -> None:
     # Ten fields of ranges 60 and 12; the mean of the fitted ranges' logarithms has a standard
     # error of about 0.1 (one field's spread is 0.3), so a factor of 1.35 is three of them.

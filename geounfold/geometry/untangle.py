@@ -29,8 +29,9 @@ _LEAST = 1e-6  # eps if nothing is inverted
 _FALLS = 0.5
 """Share of the inverted elements, of two values of eps before, below which others are tried.
 
-Measured: 26 neighbourhoods that came out upright took one to three values and went below a sixth
-in two; of a body that never did, 0.8 and 0.95 were left, in each of its neighbourhoods alike.
+Measured: 14 neighbourhoods of four bodies, 10 of them with inverted elements, came out upright
+within three values, and two values left a sixth at most.  Of a body that never did, two values left
+0.8 and 0.95, in each of its neighbourhoods alike.
 """
 
 
